@@ -16,7 +16,7 @@ from isiw.estimate import WindowEstimate
 from isiw.lazy import Later
 from isiw.models.particles.jumps import law_of
 from isiw.models.particles.latents import Latents, latents_of
-from isiw.models.particles.misfit import against_curve
+from isiw.models.particles.misfit import against_level
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
 from isiw.models.particles.posterior import SwarmPosterior
@@ -161,11 +161,11 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        prior = self.model.prior
-        latents, fields = self.swarm.picked(self.law, self.model.particles, person)
+        prior, swarm = self.model.prior, self.swarm
+        latents, fields = swarm.picked(self.law, self.model.particles, person)
 
         def profiles() -> SampledProfiles:
-            few = self.swarm.picked(self.law, self.model.thinned, person)[1]
+            few = swarm.picked(self.law, self.model.thinned, person)[1]
             sample = PersonSample(few, self.space, self.trials)
             return SampledProfiles(sample.expected_mep_mv(profile_grid(self.space))[0], sample.baselines_mv()[0])
 
@@ -180,15 +180,8 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
             unusual=Later(lambda: prior.unusual(latents, self.space)),
             change=Later(lambda: prior.change(latents).named(self.trials)),
             time_alone=Later(lambda: float((prior.of_time(latents, self.trials) & ~latents.present).mean())),
-            misfit=Later(lambda: Misfit(self.swarm.bets.worth(person), self._against_curve(person))),
+            misfit=Later(lambda: Misfit(swarm.bets.worth(person), against_level(swarm.history, person * swarm.halves))),
         )
-
-    def _against_curve(self, person: int) -> float | None:
-        """How strongly the pairs speak against the curve of pulses given alone."""
-        swarm, one = self.swarm, slice(person, person + 1)
-        prior, weights = self.model.prior, np.exp(swarm.log_weights[person]) * swarm.of_given
-        prior = prior if swarm.halves > 1 else replace(prior, other_curve=0.0)
-        return against_curve(prior, Latents._make(each[one] for each in swarm.latents), weights, swarm.history)
 
 
 def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:
