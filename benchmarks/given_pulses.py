@@ -283,7 +283,7 @@ def main(
     cohort, counts = examined(people, seed, recorded=recorded), pulses or [30, 60]
     what = "known" if known else "wrong" if wrong else "right"
     whose = "recorded" if recorded else "recruitment"
-    folder = out.with_suffix(f".{what}-{'-'.join(map(str, counts))}-{whose}-{seed}.sessions")
+    folder = out.with_suffix(f".{what}-{'-'.join(map(str, counts))}-{whose}-{seed}.rows")
 
     def row_of(number: int) -> pd.DataFrame:
         own, other = cohort[number]

@@ -82,9 +82,9 @@ def test_amplitudes_that_no_person_has_make_the_model_doubt_its_law() -> None:
 
 
 def over_a_curve(least_mv: float, lowest_pct_rmt: float = 90.0) -> tuple[tuple[float, float], ...]:
-    """Twenty pulses alone at five intensities, with sizes that grow with the intensity."""
-    over_pct = lowest_pct_rmt + np.arange(20) % 5 * 10.0
-    sizes_mv = least_mv * np.exp((over_pct - 90.0) / 20.0 + 0.3 * np.random.default_rng(3).standard_normal(20))
+    """25 pulses alone at five intensities, with sizes that grow with the intensity."""
+    over_pct = lowest_pct_rmt + np.arange(25) % 5 * 10.0
+    sizes_mv = least_mv * np.exp((over_pct - 90.0) / 20.0 + 0.3 * np.random.default_rng(3).standard_normal(25))
     return tuple(zip(over_pct.tolist(), sizes_mv.tolist(), strict=True))
 
 
@@ -115,7 +115,7 @@ def test_large_pairs_are_an_effect_of_the_tap_and_no_other_level() -> None:
 def test_levels_are_compared_person_by_person() -> None:
     model = ParticleModel(particles=50)
     posterior = model.begin(VALVE_SPACE, 0, people=2)
-    for _ in range(4):
+    for _ in range(5):
         alone = Observation.of([None, None], [0.03, 0.01], shift_pct_rmt=[0.0, 0.0])
         posterior = model.update(posterior, alone)
     for mep_mv in SILENT_MV:

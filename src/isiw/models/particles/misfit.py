@@ -31,11 +31,14 @@ EACH: Final = 4
 NARROWEST: Final = 1e-3
 """A probability of a smaller amplitude is known to this: particles have no finer tails."""
 
-NEAR_PCT_RMT: Final = 3.0
+NEAR_PCT_RMT: Final = 4.0
 """Pulses given alone that are no further from the pairs' intensity are compared with them [% RMT]."""
 
-LEAST_GIVEN, LEAST_SINCE, SMALLEST = 3, 8, 1 / 3
-"""How many amplitudes at least are compared with how many of the session, and which share of each, the smallest."""
+LEAST_GIVEN, LEAST_SINCE = 5, 8
+"""Fewer pulses given alone, or amplitudes of the session, are not compared."""
+
+OF_GIVEN, OF_SESSION = 1 / 3, 1 / 4
+"""Which shares of both are compared, the smallest; that of the session is less, since many pairs are in a window."""
 
 SAME_SD, OTHER_SD, LEAST_SD = 0.15, 1.0, 0.2
 """By how much levels differ where nothing was moved, and otherwise, and the smallest SD of single amplitudes; logs."""
@@ -122,7 +125,8 @@ def against_level(history: History, row: int) -> float | None:
     before, since = sizes[given & (np.abs(shift_pct_rmt) <= NEAR_PCT_RMT)], sizes[~given & (shift_pct_rmt == 0.0)]
     if len(before) < LEAST_GIVEN or len(since) < LEAST_SINCE:
         return None
-    parts = [np.sort(each)[: math.ceil(SMALLEST * len(each))] for each in (before, since)]
+    smallest = (before, OF_GIVEN), (since, OF_SESSION)
+    parts = [np.sort(each)[: math.ceil(share * len(each))] for each, share in smallest]
     squares = sum(float(((part - part.mean()) ** 2).sum()) for part in parts)
     variance = max(LEAST_SD**2, squares / (len(parts[0]) + len(parts[1]) - 2))
     same = SAME_SD**2 + variance * sum(1.0 / len(part) for part in parts)
