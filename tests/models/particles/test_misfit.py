@@ -112,7 +112,7 @@ def test_large_pairs_are_an_effect_of_the_tap_and_no_other_level() -> None:
     assert known(known(examined(30.0 * SILENT_MV, over_a_curve(0.01)).misfit).curve) < 1
 
 
-def test_levels_are_compared_person_by_person() -> None:
+def test_levels_are_compared_person_by_person_and_pulses_of_another_one_left_out() -> None:
     model = ParticleModel(particles=50)
     posterior = model.begin(VALVE_SPACE, 0, people=2)
     for _ in range(5):
@@ -121,6 +121,11 @@ def test_levels_are_compared_person_by_person() -> None:
     for mep_mv in SILENT_MV:
         posterior = model.update(posterior, Observation.of([60.0, 60.0], [mep_mv, mep_mv]))
     assert [known(posterior.estimate(person).misfit).of_curve for person in (0, 1)] == [True, False]
+    weights = np.exp(posterior.swarm.log_weights)
+    assert weights.sum(1) == pytest.approx(1.0)
+    contradicted, other = weights[:, posterior.swarm.of_given].sum(1)
+    assert 0 < contradicted < 1e-20
+    assert other > 0.5
 
 
 def test_nothing_is_bet_on_pulses_given_alone_which_count_as_parts_of_a_trial() -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from isiw.change import Misfit
+from isiw.change import AGAINST_A_CURVE, Misfit
 from isiw.checks import MOST_OF_A_KIND, Checked, NonNegative, Positive, Share, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
@@ -107,11 +107,19 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         return replace(self, swarm=self.swarm.as_usual(self.law, self.usual))
 
     def after(self, observation: Observation) -> ParticlePosterior:
-        """The posterior after one more trial; a pulse given alone first may be of another curve than the pairs."""
+        """The posterior after one more trial; a pulse given alone first may be of another curve than the pairs.
+
+        From where the levels of both are said not to fit, those who have learnt from such pulses are left out.
+        """
         given = self.swarm.before_pairs and bool(np.isnan(observation.isi_ms).all())
         doubted = given and observation.shift_pct_rmt is not None
         own = replace(self, swarm=self.swarm.doubting(self.model.prior.other_curve)) if doubted else self
-        return super(ParticlePosterior, own).after(observation)
+        learnt = super(ParticlePosterior, own).after(observation)
+        if learnt.swarm.halves == 1 or given:
+            return learnt
+        people = range(0, len(learnt.swarm.history.columns), learnt.swarm.halves)
+        against = np.array([against_level(learnt.swarm.history, row) or 0.0 for row in people])
+        return replace(learnt, swarm=learnt.swarm.unheeding(against >= AGAINST_A_CURVE))
 
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""

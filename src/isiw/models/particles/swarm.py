@@ -39,6 +39,10 @@ OF_GIVEN = 0.3
 """As how much of a trial a pulse alone counts that was given before the pairs (decision 53)."""
 
 
+UNHEEDED = 50.0
+"""Minus the log of the probability that is left to pulses alone which the session has contradicted."""
+
+
 class Health(NamedTuple):
     """How b people's particles took a trial; fields of shape (b,)."""
 
@@ -144,6 +148,16 @@ class Swarm:
         crowd = Crowd._make(doubled)
         crowd = crowd._replace(log_weights=crowd.log_weights + parts)
         return replace(self, crowd=crowd, history=History(self.history.columns.repeat(2, axis=0)), halves=2)
+
+    def unheeding(self, who: BoolArray) -> Swarm:
+        """The same where hardly a particle learns from pulses given alone, of some people (b,)."""
+        if not who.any():
+            return self
+        heeded = np.where(self.of_given, self.log_weights, -np.inf)
+        left = self.log_weights - log_sum(heeded)[:, np.newaxis] - UNHEEDED
+        log_weights = np.where(who[:, np.newaxis] & self.of_given, left, self.log_weights)
+        log_weights -= log_sum(log_weights)[:, np.newaxis]
+        return replace(self, crowd=self.crowd._replace(log_weights=log_weights))
 
     @property
     def before_pairs(self) -> bool:
