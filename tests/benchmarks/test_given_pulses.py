@@ -10,6 +10,7 @@ import pytest
 from benchmarks.given_pulses import Curve, Examined, compared, examined, given, main, wrong_curves
 
 import isiw
+from known import known
 
 OVER_PCT_RMT = [90.0, 110.0, 130.0]
 FLOOR_MV = 0.01
@@ -24,7 +25,7 @@ def of_curve(pulse: Curve) -> Examined:
 def test_a_wrong_curve_is_another_level_scale_place_or_muscle() -> None:
     own, other = of_curve(lambda pct_rmt, _: pct_rmt / 100.0), of_curve(lambda pct_rmt, _: 7.0 * pct_rmt)
     curves = wrong_curves(own, other, 0)
-    sizes = {name: [trial.mep_mv for trial in given(own, curve, 3)] for name, curve in curves.items()}
+    sizes = {name: [known(trial.mep_mv) for trial in given(own, curve, 3)] for name, curve in curves.items()}
     right = np.array(sizes["right"])
     assert right.tolist() == [0.9, 1.1, 1.3]
     assert sizes["level × 3"] == pytest.approx(3 * right)
