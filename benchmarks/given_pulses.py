@@ -2,21 +2,29 @@
 
     python -m benchmarks.given_pulses --people 200
     python -m benchmarks.given_pulses --people 200 --known
-    python -m benchmarks.given_pulses --people 200 --pulses 60 --times 3
+    python -m benchmarks.given_pulses --people 100 --pulses 60 --wrong
+    python -m benchmarks.given_pulses --people 100 --pulses 60 --wrong --recorded
 
 The people are those of `recruitment`, whose pairs are given at 90 % RMT. Before the pairs come pulses of TMS alone from
 90 to 140 % RMT, evenly spaced, in an order of their own, without drift. Each person is examined without them, and with
 each number of them: at the same level, and as pulses of a level that may be another. `--known` examines them without
 pulses, but with a prior that knows what pulses could at most teach (the person's curve, kind of noise and EMG floor),
-what they cannot (the law of the cohort's windows), and both. With `--times` the given amplitudes are so many times what
-they were: a wrong curve. All F1 are of the same people, and pairs have the same noise. Reported people come from seed
-200,000 on; seeds below 1,000 are for work.
+what they cannot (the law of the cohort's windows), and both. With `--wrong` the pulses, stated as of the same level,
+are the right ones, and of each curve of `WRONG`. `--recorded` examines people whose MEPs were recorded instead, the
+pulses being of the half that pairs are not drawn from (`benchmarks.recorded_people`). All F1 are of the same people,
+and pairs have the same noise. Standard errors are by person. Rows are kept beside `--out` as people are done, and the
+same command continues where it was interrupted. Reported people come from seed 190,000 on; seeds below 1,000 are for
+work.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Annotated, Final, cast
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Final, TypeAlias, cast
 
 import numpy as np
 import pandas as pd
@@ -24,8 +32,11 @@ import torch
 import typer
 
 import isiw
-from benchmarks.provenance import command_of, made_with
+from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
+from benchmarks.recorded_people import RecordedPerson, recordings
+from benchmarks.recorded_tables import error_by_person
+from benchmarks.tables import kept, write_table
 from isiw.metrics import f1
 from isiw.models.particles.laws import FOREARM, Floor, NoiseShares
 from isiw.models.particles.prior import Prior
@@ -74,41 +85,139 @@ def with_curve(prior: Prior, subject: SimulatedSubject) -> Prior:
     )
 
 
-def given(subject: SimulatedSubject, number: int, seed: int, times: float = 1.0) -> list[Trial]:
-    """Pulses of TMS alone over the curve, in an order by the seed."""
-    response, trials = cast("RecruitmentResponse", subject.response), []
-    over_pct_rmt = np.random.default_rng([seed, 45]).permutation(np.linspace(*OVER_PCT_RMT, number))
-    for pulse, pct_rmt in enumerate(over_pct_rmt.tolist()):
-        there = replace(subject, drift=None, response=replace(response, intensity_pct_rmt=pct_rmt))
-        mep_mv = times * there.begin(1000 * seed + pulse).respond(None, SPACE.reference).mep_mv
-        trials.append(Trial(pulse, Status.ACCEPTED, None, mep_mv=mep_mv, intensity_pct_rmt=pct_rmt))
-    return trials
+Curve: TypeAlias = Callable[[float, int], float]
+"""The amplitude [mV] of a pulse alone by its intensity [% RMT] and its number."""
 
 
-def strategies(
-    subject: SimulatedSubject, seed: int, pulses: list[int], times: float, *, known: bool
-) -> dict[str, Strategy]:
-    """The default before the first pair, by what it knows."""
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A person whose pulses alone are given before the pairs.
+
+    Args:
+        subject: the person in pairs.
+        pulse: the person's curve.
+        floor_mv: about what a sweep has without a response [mV].
+        over_pct_rmt: intensities of any number of pulses, in their order [% RMT].
+        whose: who counts as one person in standard errors.
+    """
+
+    subject: SimulatedSubject
+    pulse: Curve
+    floor_mv: float
+    over_pct_rmt: Callable[[int], Sequence[float]]
+    whose: int
+
+    @classmethod
+    def simulated(cls, subject: SimulatedSubject, number: int, seed: int) -> Examined:
+        """One of `recruitment`, without drift."""
+        response = cast("RecruitmentResponse", subject.response)
+
+        def pulse(pct_rmt: float, number: int) -> float:
+            there = replace(subject, drift=None, response=replace(response, intensity_pct_rmt=pct_rmt))
+            return there.begin(1000 * seed + number).respond(None, SPACE.reference).mep_mv
+
+        def over(pulses: int) -> list[float]:
+            evenly = np.linspace(*OVER_PCT_RMT, pulses)
+            return np.random.default_rng([seed, 45]).permutation(evenly).tolist()  # type: ignore[no-any-return]
+
+        return cls(subject, pulse, response.floor.median_mv, over, number)
+
+    @classmethod
+    def recorded(cls, person: RecordedPerson) -> Examined:
+        """One whose MEPs were recorded; pulses are of the half that pairs are not drawn from."""
+        bank = person.bank.half("other")
+
+        def pulse(pct_rmt: float, number: int) -> float:
+            rng = np.random.default_rng([person.seed, person.number, 2, number])
+            return bank.drawn_mv(float(bank.places(pct_rmt)), rng)
+
+        def over(pulses: int) -> list[float]:
+            return [pct_rmt for pct_rmt, _ in person.single_pulses(pulses)]
+
+        return cls(person.subject(), pulse, float(np.median(bank.amplitudes_mv[0])), over, bank.person)
+
+
+def another_muscle(subject: SimulatedSubject, seed: int) -> SimulatedSubject:
+    """The same with a flatter curve, with another threshold and another size."""
+    own, rng = cast("RecruitmentResponse", subject.response), np.random.default_rng([seed, 46])
+    curve = replace(
+        own,
+        slope_per_pct=own.slope_per_pct * rng.uniform(0.4, 0.8),
+        x50_pct_rmt=own.x50_pct_rmt + rng.uniform(-8.0, 12.0),
+        amplitude_mv=own.amplitude_mv * float(np.exp(0.8 * rng.standard_normal())),
+    )
+    return replace(subject, response=curve)
+
+
+def coil_moved(own: Examined, rng: np.random.Generator) -> Curve:
+    """The curve under a coil that lay elsewhere: a higher threshold, and less of what is above the EMG floor."""
+    shift_pct_rmt, left = rng.uniform(10.0, 20.0), rng.uniform(0.4, 0.8)
+    least_mv = own.floor_mv
+
+    def pulse(pct_rmt: float, number: int) -> float:
+        mep_mv = own.pulse(pct_rmt - shift_pct_rmt, number)
+        return min(mep_mv, least_mv) + left * max(0.0, mep_mv - least_mv)
+
+    return pulse
+
+
+def wrong_curves(own: Examined, other: Examined, seed: int) -> dict[str, Curve]:
+    """The right curve and wrong ones, by what is wrong.
+
+    Args:
+        own: the person.
+        other: whose curve stands for that of another muscle.
+        seed: how far the coil lay off, and whether the intensities stated are too low by a tenth or too high.
+    """
+    rng = np.random.default_rng([seed, 69])
+    scale = 1.1 if rng.random() < 0.5 else 1 / 1.1
+    return {
+        "right": own.pulse,
+        "another muscle": other.pulse,
+        "coil moved": coil_moved(own, rng),
+        "scale off by 10 %": lambda pct_rmt, number: own.pulse(scale * pct_rmt, number),
+        "level × 3": lambda pct_rmt, number: 3.0 * own.pulse(pct_rmt, number),
+    }
+
+
+def given(own: Examined, curve: Curve, number: int) -> list[Trial]:
+    """Pulses of TMS alone, at the person's intensities, of some curve."""
+    over_pct_rmt = enumerate(own.over_pct_rmt(number))
+    return [
+        Trial(pulse, Status.ACCEPTED, None, mep_mv=curve(pct_rmt, pulse), intensity_pct_rmt=pct_rmt)
+        for pulse, pct_rmt in over_pct_rmt
+    ]
+
+
+def strategies(own: Examined, other: Examined, seed: int, pulses: list[int], what: str) -> dict[str, Strategy]:
+    """The default before the first pair, by what it knows; `what` is "known", "wrong" or "right"."""
 
     def default(prior: Prior | None = None) -> Strategy:
         more = {} if prior is None else {"prior": prior}
-        return isiw.make_strategy("default", SPACE, seed, hit_delay_ms=subject.stated_hit_delay_ms, **more)
+        return isiw.make_strategy("default", SPACE, seed, hit_delay_ms=own.subject.stated_hit_delay_ms, **more)
+
+    def after(curve: Curve, number: int, *, same_level: bool) -> Strategy:
+        strategy = default()
+        strategy.learn_all(given(own, curve, number), same_level=same_level)
+        return strategy
 
     ways = {"nothing": default()}
-    if known:
+    if what == "known":
         windows = replace(Prior(), profile=WINDOWS)
-        ways |= {"the curve": default(with_curve(Prior(), subject)), "the windows' law": default(windows)}
-        return ways | {"both": default(with_curve(windows, subject))}
+        ways |= {"the curve": default(with_curve(Prior(), own.subject)), "the windows' law": default(windows)}
+        return ways | {"both": default(with_curve(windows, own.subject))}
     for number in pulses:
-        for same_level in (True, False):
-            way = f"{number} pulses" + ("" if same_level else ", another level")
-            ways[way] = default()
-            ways[way].learn_all(given(subject, number, seed, times), same_level=same_level)
+        if what == "wrong":
+            curves = wrong_curves(own, other, seed)
+            ways |= {f"{number} pulses, {name}": after(each, number, same_level=True) for name, each in curves.items()}
+        else:
+            ways[f"{number} pulses"] = after(own.pulse, number, same_level=True)
+            ways[f"{number} pulses, another level"] = after(own.pulse, number, same_level=False)
     return ways
 
 
 def session(subject: SimulatedSubject, seed: int, strategy: Strategy) -> dict[str, float]:
-    """After each of `MARKS` pairs the F1, the F1 expected, and whether pulses and pairs are said not to fit."""
+    """After each of `MARKS` pairs the F1, the F1 expected, and what is said against pulses, pairs and law."""
     responder, truth, found = subject.begin(seed), subject.window(SPACE), dict[str, float]()
     for pair in range(1, MARKS[-1] + 1):
         response = responder.respond(strategy.ask(), SPACE.reference)
@@ -121,38 +230,72 @@ def session(subject: SimulatedSubject, seed: int, strategy: Strategy) -> dict[st
                 f"F1 {pair}": f1(estimate, truth, SPACE),
                 f"expected {pair}": estimate.expected_f1 or np.nan,
                 f"no fit {pair}": float(changed or (misfit is not None and misfit.of_curve)),
+                f"law doubted {pair}": float(misfit is not None and misfit.of_law),
             }
     return found
+
+
+def examined(people: int, seed: int, *, recorded: bool) -> list[tuple[Examined, Examined]]:
+    """The people, and beside each whose curve stands for that of another muscle: of recorded people the next one's."""
+    if recorded:
+        cohort = [Examined.recorded(RecordedPerson(number, seed, recordings())) for number in range(people + 1)]
+        return list(pairwise(cohort))
+    subjects = enumerate(isiw.subjects.cohort("recruitment", people, seed))
+    return [
+        (
+            Examined.simulated(subject, number, seed + number),
+            Examined.simulated(another_muscle(subject, seed + number), number, seed + number),
+        )
+        for number, subject in subjects
+    ]
+
+
+def compared(rows: pd.DataFrame) -> pd.DataFrame:
+    """Means of what is known beforehand, and F1 more than with nothing, with standard errors by person."""
+    usual = rows[rows["known"] == "nothing"].set_index("number")
+    table = []
+    for known, part in rows.groupby("known", sort=False):
+        figures = part.drop(columns=["known", "number", "whose"]).mean().to_dict()
+        for mark in MARKS:
+            gain = part[f"F1 {mark}"] - part["number"].map(usual[f"F1 {mark}"])
+            figures |= {f"gain {mark}": gain.mean(), f"gain {mark} SE": error_by_person(gain, part["whose"])}
+        table.append({"known": known, "people": len(part), **figures})
+    return pd.DataFrame(table)
 
 
 def main(
     people: Annotated[int, typer.Option(help="People.")] = 50,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 200_000,
     pulses: Annotated[list[int] | None, typer.Option(help="How many pulses; repeat it for several.")] = None,
-    times: Annotated[float, typer.Option(help="By what given amplitudes are multiplied.")] = 1.0,
+    out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("given_pulses"),
     *,
     known: Annotated[bool, typer.Option("--known", help="No pulses, but priors that know parts of the truth.")] = False,
+    wrong: Annotated[bool, typer.Option("--wrong", help="Pulses of wrong curves beside the right one.")] = False,
+    recorded: Annotated[bool, typer.Option("--recorded", help="People whose MEPs were recorded.")] = False,
 ) -> None:
     """Print how the sessions compare."""
     torch.set_num_threads(1)
-    rows = []
-    for number, person in enumerate(isiw.subjects.cohort("recruitment", people, seed)):
-        ways = strategies(person, seed + number, pulses or [30, 60], times, known=known)
-        rows += [{"known": way, "person": number, **session(person, seed + number, each)} for way, each in ways.items()]
-    table = pd.DataFrame(rows)
-    usual = table[table["known"] == "nothing"].set_index("person")
-    for mark in MARKS:
-        table[f"gain {mark}"] = table[f"F1 {mark}"] - table["person"].map(usual[f"F1 {mark}"])
-    groups = table.drop(columns="person").groupby("known", sort=False)
-    print(f"- command: `{command_of('given_pulses')}`; seed of the people {seed:,}")
-    print(f"- {made_with('torch')}\n")
-    print(
-        groups.mean()
-        .join(groups[[f"gain {mark}" for mark in MARKS]].sem().add_suffix(" SE"))
-        .to_markdown(floatfmt=".3f")
-    )
+    if recorded and not recordings().is_dir():
+        print(f"Skipped: the recordings are not at hand, {recordings()} is no folder.")
+        return
+    if recorded and known:
+        raise typer.BadParameter("who was recorded has no law that a prior could know")
+    cohort, counts = examined(people, seed, recorded=recorded), pulses or [30, 60]
+    what = "known" if known else "wrong" if wrong else "right"
+    whose = "recorded" if recorded else "recruitment"
+    folder = out.with_suffix(f".{what}-{'-'.join(map(str, counts))}-{whose}-{seed}.rows")
+
+    def row_of(number: int) -> pd.DataFrame:
+        own, other = cohort[number]
+        ways = strategies(own, other, seed + number, counts, what).items()
+        who = {"number": number, "whose": own.whose}
+        return pd.DataFrame([{"known": w, **who, **session(own.subject, seed + number, s)} for w, s in ways])
+
+    rows = [kept(folder / f"{number}.parquet", partial(row_of, number)) for number in range(people)]
+    table = compared(pd.concat(rows, ignore_index=True))
+    write_table(table, facts_of("given_pulses", "torch", seed=seed, people=people), out)
 
 
 if __name__ == "__main__":
-    understood("given_pulses", prints=True)
+    understood("given_pulses")
     typer.run(main)

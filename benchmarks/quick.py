@@ -43,7 +43,7 @@ QUICK: Final[Mapping[str, str]] = {
     "dissertation": "--few --out OUT",
     "fair_opponent": "--people 3 --trials 12 --out OUT",
     "first_words": "--trials 6",
-    "given_pulses": "--people 2",
+    "given_pulses": "--people 2 --out OUT",
     "headline": "--people 2 --trials 6 --processes 1 --out OUT",
     "house": "",
     "impact_stream": "--sweeps 100",

@@ -4,7 +4,8 @@
 
 The recordings lie in no repository of ours: `--data`, or the variable ISIW_SHARED_DATA, names their folder. `--given
 0,10,30,60,600` gives the default so many single pulses of the other half first; `--fitted` adds the default with the
-prior that `benchmarks.response_prior` fitted to all other persons. Sessions are kept beside the result as they finish,
+prior that `benchmarks.response_prior` fitted to all other persons. `--made-up 10` puts hands of the default's own law
+in the place of who was recorded, so many pulses a level. Sessions are kept beside the result as they finish,
 and the same command continues where it was interrupted. Standard errors are by bootstrap over the ten persons, each
 with all coils. Seeds below 1,000 are for work.
 """
@@ -161,7 +162,7 @@ def chunks(
     ]
 
 
-def main(
+def main(  # noqa: PLR0913, PLR0917 - options of a command line
     people: Annotated[int, typer.Option(help="Sessions of each strategy; the thirty banks come in turn.")] = 400,
     seed: Annotated[int, typer.Option(help="Seed of windows, rigs and draws.")] = 10_000,
     given: Annotated[str, typer.Option(help="Numbers of single pulses given first, comma-separated.")] = "0",
@@ -169,6 +170,7 @@ def main(
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     data: Annotated[Path | None, typer.Option(help="Folder of the recordings.")] = None,
     fitted: Annotated[Path | None, typer.Option(help="JSON of benchmarks.response_prior, with its folds.")] = None,
+    made_up: Annotated[int | None, typer.Option(help="Pulses a level of people of the default's own law.")] = None,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("recorded_cohort"),
 ) -> None:
     """Compare the default with who knows the law, on recorded people."""
@@ -176,8 +178,8 @@ def main(
     if not data.is_dir():
         print(f"Skipped: the recordings are not at hand, {data} is no folder. Name it with --data.")
         return
-    cohort = [RecordedPerson(number, seed, data) for number in range(people)]
-    folder = out.with_suffix(f".{seed}-{trials}.sessions")
+    cohort = [RecordedPerson(number, seed, data, made_up) for number in range(people)]
+    folder = out.with_suffix(f".{seed}-{trials}{'' if made_up is None else f'-{made_up}'}.sessions")
     folder.mkdir(parents=True, exist_ok=True)
     folds = None if fitted is None else read_folds(json.loads(fitted.read_text(encoding="utf-8")))
     units, found = chunks(cohort, [int(each) for each in given.split(",")], trials, folder, folds), []

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
 
-from isiw.subjects import EmgFloor, PeakProfile, SimulatedSubject, TrialNoise
+from isiw.subjects import EmgFloor, PeakProfile, RecruitmentResponse, SimulatedSubject, TrialNoise
+from isiw.subjects.responses import log_normal
 from isiw.types import ArrayLike, FloatArray
 
 FOLDER: Final = "ISIW_SHARED_DATA"
@@ -94,6 +95,28 @@ def banks(folder: Path) -> tuple[Bank, ...]:
     return tuple(found)
 
 
+def made_up(bank: Bank, pulses: int, rng: np.random.Generator) -> Bank:
+    """A bank of so many pulses a level of a hand as the default expects it, in the place of a recorded one."""
+    slope = 0.23 * np.exp(0.1 * rng.standard_normal())
+    curve = RecruitmentResponse(
+        EmgFloor(0.009 * np.exp(0.38 * rng.standard_normal()), 0.2),
+        amplitude_mv=0.8 * np.exp(0.85 * rng.standard_normal()),
+        slope_per_pct=slope,
+        x50_pct_rmt=117.0 + 3.5 * rng.standard_normal(),
+        boost_pct_rmt=0.0,
+        sigma_x_pct_rmt=1.65 * np.exp(0.25 * rng.standard_normal()) / slope,
+        sigma_y=0.39,
+    )
+
+    def pulse(pct_rmt: float) -> float:
+        there = replace(curve, intensity_pct_rmt=pct_rmt)
+        evoked_mv = there.sample_evoked_mv(0.0, TrialNoise(rng.standard_normal()), rng)
+        return evoked_mv + log_normal(rng, curve.floor.median_mv, curve.floor.log_sd)
+
+    levels = tuple(np.array([pulse(pct_rmt) for _ in range(pulses)]) for pct_rmt in bank.levels_pct_rmt.tolist())
+    return replace(bank, amplitudes_mv=levels)
+
+
 @dataclass(frozen=True, eq=False)
 class RecordedResponse:
     """The response of a person to the pulses of pairs, a recorded amplitude each; half of a bank.
@@ -130,17 +153,21 @@ class RecordedPerson:
         number: which one, from 0; the banks come in turn.
         seed: of the cohort.
         folder: of the recordings.
+        pulses: how many a level a made-up person has, in the place of who was recorded; None for who was.
     """
 
     number: int
     seed: int
     folder: Path
+    pulses: int | None = None
 
-    @property
+    @cached_property
     def bank(self) -> Bank:
         """All that was recorded."""
         all_banks = banks(self.folder)
-        return all_banks[self.number % len(all_banks)]
+        recorded = all_banks[self.number % len(all_banks)]
+        rng = np.random.default_rng([self.seed, self.number, 3])
+        return recorded if self.pulses is None else made_up(recorded, self.pulses, rng)
 
     def subject(self, half: Half = "drawn") -> SimulatedSubject:
         """The person whose responses are those of one half."""

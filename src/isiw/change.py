@@ -71,8 +71,8 @@ class Misfit:
     Args:
         law: what a bet of 1 against it has been worth at most; where the law is right, it ever reaches x with
             probability 1 / x at most.
-        curve: the Bayes factor of pairs that do not follow the recruitment curve of pulses given alone over pairs that
-            do; None if none were given at another intensity.
+        curve: the Bayes factor of pulses given alone first that are of a higher level than the session over the same
+            level; None where too few were given at about the pairs' intensity.
     """
 
     law: float

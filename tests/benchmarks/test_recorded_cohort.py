@@ -64,6 +64,16 @@ def test_single_pulses_are_of_the_other_half_and_the_first_of_many_are_the_few(m
     assert [level for level, _ in many].count(90.0) == 15
 
 
+def test_people_who_are_made_up_have_the_levels_of_who_was_recorded_and_as_many_pulses_as_are_asked(
+    made_up: Path,
+) -> None:
+    recorded, person = RecordedPerson(0, 5, made_up).bank, RecordedPerson(0, 5, made_up, 40)
+    assert person.bank.levels_pct_rmt.tolist() == recorded.levels_pct_rmt.tolist()
+    assert [len(level) for level in person.bank.half("drawn").amplitudes_mv] == [20] * 4
+    assert (np.diff(person.bank.means_mv) > 0).all()
+    assert RecordedPerson(0, 5, made_up, 40).bank.means_mv.tolist() == person.bank.means_mv.tolist()
+
+
 def test_the_law_is_a_histogram_of_each_level_that_excludes_nothing() -> None:
     edges, mass = histograms(counted())
     assert edges.shape == (BINS - 1,)

@@ -208,7 +208,7 @@ def _best_isi(estimate: Estimate) -> str:
 
 
 def _misfit(found: Misfit | None) -> str:
-    """That amplitudes do not follow the law of responses, or the pairs not the curve of pulses given alone."""
+    """That amplitudes do not follow the law of responses, or that pulses given alone are of another level."""
     if found is not None and found.of_law:
         wrong = "The MEPs vary otherwise than the law of responses expects, so that the window may be wrong."
         return f"{wrong} Look at the sweeps: are there artefacts, or pulses without a response?"

@@ -8,9 +8,7 @@ from isiw.change import Misfit
 from isiw.design import VALVE_SPACE
 from isiw.estimate import WindowEstimate
 from isiw.models.particles import ParticleModel
-from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.misfit import Bets, probability_below
-from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import observed
 from isiw.trials import Trial
@@ -83,27 +81,56 @@ def test_amplitudes_that_no_person_has_make_the_model_doubt_its_law() -> None:
     assert misfit.curve is None
 
 
-def test_pulses_alone_that_the_pairs_contradict_are_said_not_to_fit_and_others_are_not() -> None:
-    rng = np.random.default_rng(3)
-    over_pct = np.linspace(90.0, 130.0, 20)
-    noise, silent_mv = np.exp(0.3 * rng.standard_normal(20)), 0.01 * np.exp(0.2 * rng.standard_normal(10))
-    for least_mv, contradicts in ((0.3, True), (0.012, False)):
-        growing_mv = least_mv * np.exp((over_pct - 90.0) / 20.0) * noise
-        misfit = known(examined(silent_mv, tuple(zip(over_pct.tolist(), growing_mv.tolist(), strict=True))).misfit)
-        assert misfit.of_curve == contradicts
-        assert math.isfinite(known(misfit.curve))
+def over_a_curve(least_mv: float, lowest_pct_rmt: float = 90.0) -> tuple[tuple[float, float], ...]:
+    """25 pulses alone at five intensities, with sizes that grow with the intensity."""
+    over_pct = lowest_pct_rmt + np.arange(25) % 5 * 10.0
+    sizes_mv = least_mv * np.exp((over_pct - 90.0) / 20.0 + 0.3 * np.random.default_rng(3).standard_normal(25))
+    return tuple(zip(over_pct.tolist(), sizes_mv.tolist(), strict=True))
 
 
-@pytest.mark.parametrize("without", [0.0, 1e-6])
-def test_a_prior_of_hardly_anything_but_curves_does_not_speak_against_one(without: float) -> None:
-    noise = NoiseShares(constant_cv=without, missing=0, recruitment=1 - without, all_or_none=0, rectified=0)
-    model = ParticleModel(Prior(noise=noise), particles=100)
-    posterior = model.begin(VALVE_SPACE, 0)
-    for pct_rmt, mep_mv in ((100.0, 0.05), (120.0, 0.4)):
-        told = Observation.of([None], [mep_mv], shift_pct_rmt=[pct_rmt - model.pairs_pct_rmt])
-        posterior = model.update(posterior, told)
-    posterior = model.update(posterior, Observation.of([60.0], [0.05]))
-    assert not known(posterior.estimate().misfit).of_curve
+SILENT_MV = 0.01 * np.exp(0.2 * np.random.default_rng(4).standard_normal(10))
+
+
+@pytest.mark.parametrize(("least_mv", "contradicts"), [(0.03, True), (0.01, False), (0.003, False)])
+def test_pulses_alone_of_three_times_the_level_are_said_not_to_fit_and_others_are_not(
+    least_mv: float, *, contradicts: bool
+) -> None:
+    misfit = known(examined(SILENT_MV, over_a_curve(least_mv)).misfit)
+    assert misfit.of_curve == contradicts
+    assert math.isfinite(known(misfit.curve))
+
+
+def test_pulses_that_are_all_stronger_than_the_pairs_say_nothing_of_the_level() -> None:
+    assert known(examined(SILENT_MV, over_a_curve(0.03, lowest_pct_rmt=95.0)).misfit).curve is None
+
+
+def test_a_few_pairs_say_nothing_of_the_level() -> None:
+    assert known(examined(SILENT_MV[:7], over_a_curve(0.03)).misfit).curve is None
+
+
+def test_large_pairs_are_an_effect_of_the_tap_and_no_other_level() -> None:
+    assert known(known(examined(30.0 * SILENT_MV, over_a_curve(0.01)).misfit).curve) < 1
+
+
+def test_levels_are_compared_person_by_person_and_pulses_of_another_one_left_out() -> None:
+    model = ParticleModel(particles=50)
+    posterior = model.begin(VALVE_SPACE, 0, people=2)
+    for _ in range(5):
+        alone = Observation.of([None, None], [0.03, 0.01], shift_pct_rmt=[0.0, 0.0])
+        posterior = model.update(posterior, alone)
+    for mep_mv in SILENT_MV:
+        posterior = model.update(posterior, Observation.of([60.0, 60.0], [mep_mv, mep_mv]))
+    assert [known(posterior.estimate(person).misfit).of_curve for person in (0, 1)] == [True, False]
+    weights = np.exp(posterior.swarm.log_weights)
+    assert weights.sum(1) == pytest.approx(1.0)
+    contradicted, other = weights[:, posterior.swarm.of_given].sum(1)
+    assert 0 < contradicted < 1e-20
+    assert other > 0.5
+
+
+def test_nothing_is_bet_on_pulses_given_alone_which_count_as_parts_of_a_trial() -> None:
+    misfit = known(examined(SILENT_MV[:1], tuple((pct_rmt, 0.02) for pct_rmt, _ in 3 * over_a_curve(0.01))).misfit)
+    assert misfit.law < 2
 
 
 def test_what_is_doubted_is_a_matter_of_the_figures_alone() -> None:

@@ -13,18 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from isiw.models.particles.changes import INTENSITY_PCT, MATTERS
-from isiw.models.particles.latents import Latents
 from isiw.models.particles.mixture import log_sum
-from isiw.models.particles.noise import recruits
-from isiw.models.particles.prior import Prior
-from isiw.models.shared.history import BY_CURVES, History
+from isiw.models.shared.history import BY_CURVES, COUNTS, SHIFT, History
 from isiw.native.engine import log_likelihoods
 from isiw.native.law import Crowd, Law
 from isiw.types import BoolArray, FloatArray, Singles
-
-AT_THE_BOUNDARY: Final = 2
-"""By so many trials the place of a change may be off."""
 
 STAKED: Final = np.array([0.25, 0.8])
 """Shares of a stake that are bet, the rest being kept: of a law that is a little wrong, and of one that is far off."""
@@ -37,6 +30,18 @@ EACH: Final = 4
 
 NARROWEST: Final = 1e-3
 """A probability of a smaller amplitude is known to this: particles have no finer tails."""
+
+NEAR_PCT_RMT: Final = 4.0
+"""Pulses given alone that are no further from the pairs' intensity are compared with them [% RMT]."""
+
+LEAST_GIVEN, LEAST_SINCE = 5, 8
+"""Fewer pulses given alone, or amplitudes of the session, are not compared."""
+
+OF_GIVEN, OF_SESSION = 1 / 3, 1 / 4
+"""Which shares of both are compared, the smallest; that of the session is less, since many pairs are in a window."""
+
+SAME_SD, OTHER_SD, LEAST_SD = 0.15, 1.0, 0.2
+"""By how much levels differ where nothing was moved, and otherwise, and the smallest SD of single amplitudes; logs."""
 
 
 def _laws(below: FloatArray) -> FloatArray:
@@ -100,30 +105,30 @@ def probability_below(trial: History, crowd: Crowd, law: Law, who: BoolArray) ->
     return np.stack((high if point else below(ends[..., 0]), high), axis=-1)
 
 
-def against_curve(prior: Prior, latents: Latents, weights: FloatArray, history: History) -> float | None:
-    """The Bayes factor of pairs that do not follow the curve of pulses given alone, over pairs that do.
+def against_level(history: History, row: int) -> float | None:
+    """The Bayes factor of pulses given alone first that are of a higher level than the session, over the same level.
 
-    They do not follow it where they have a curve of their own, where the noise has no recruitment curve, of which those
-    pulses say nothing, or where something changed between the two. The odds before the pairs are the prior's.
+    A tap makes no amplitude smaller. So at the pairs' intensity the smallest amplitudes of the session are those of TMS
+    alone, or what a sweep has without a response, and those of pulses given alone have to be alike (decision 53).
 
     Args:
-        prior: the prior over people.
-        latents: the particles of one person, (1, p).
-        weights: of those that learn from pulses given alone, 0 of others, (p,).
         history: the trials.
+        row: whose, of those that learn from pulses given alone.
 
     Returns:
-        None where no pulse was given alone at another intensity, or the prior leaves no choice.
+        None where too few were given at about the pairs' intensity, or the session is too short.
     """
-    elsewhere = np.flatnonzero(~np.isnan(history.columns[0, :, BY_CURVES]) & np.isnan(history.isi_ms[0]))
-    if not len(elsewhere):
+    columns = history.columns[row].astype(float)
+    given, shift_pct_rmt = columns[:, COUNTS] < 1.0, columns[:, SHIFT]
+    middle = columns[:, 2:4].mean(1)
+    sizes = np.where(np.isfinite(middle), middle, np.where(np.isfinite(columns[:, 2]), *columns[:, 2:4].T))
+    before, since = sizes[given & (np.abs(shift_pct_rmt) <= NEAR_PCT_RMT)], sizes[~given & (shift_pct_rmt == 0.0)]
+    if len(before) < LEAST_GIVEN or len(since) < LEAST_SINCE:
         return None
-    change, given = prior.change(latents), elsewhere[-1] + 1
-    stepped = np.abs(change.log_gain) + np.abs(change.log_scale) + np.abs(change.shift_pct_rmt) / INTENSITY_PCT
-    changed = (np.abs(change.after - given) <= AT_THE_BOUNDARY) & (stepped > MATTERS)
-    follows = float(weights @ (recruits(latents.noise) & ~changed)[0])
-    beforehand = (prior.noise.recruitment + prior.noise.rectified) * (1.0 - prior.other_curve)
-    if not 0.0 < beforehand < 1.0:
-        return None
-    least = 0.5 / len(weights)  # particles know no smaller share
-    return max(0.0, 1.0 - follows) / (follows + least) * beforehand / (1.0 - beforehand)
+    smallest = (before, OF_GIVEN), (since, OF_SESSION)
+    parts = [np.sort(each)[: math.ceil(share * len(each))] for each, share in smallest]
+    squares = sum(float(((part - part.mean()) ** 2).sum()) for part in parts)
+    variance = max(LEAST_SD**2, squares / (len(parts[0]) + len(parts[1]) - 2))
+    same = SAME_SD**2 + variance * sum(1.0 / len(part) for part in parts)
+    other, larger = same + OTHER_SD**2, max(0.0, float(parts[0].mean() - parts[1].mean()))
+    return 2.0 * math.sqrt(same / other) * math.exp(min(LARGEST, 0.5 * larger**2 * (1.0 / same - 1.0 / other)))

@@ -9,14 +9,14 @@ from typing import Annotated
 
 import numpy as np
 
-from isiw.change import Misfit
+from isiw.change import AGAINST_A_CURVE, Misfit
 from isiw.checks import MOST_OF_A_KIND, Checked, NonNegative, Positive, Share, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import Later
 from isiw.models.particles.jumps import law_of
 from isiw.models.particles.latents import Latents, latents_of
-from isiw.models.particles.misfit import against_curve
+from isiw.models.particles.misfit import against_level
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
 from isiw.models.particles.posterior import SwarmPosterior
@@ -107,11 +107,19 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         return replace(self, swarm=self.swarm.as_usual(self.law, self.usual))
 
     def after(self, observation: Observation) -> ParticlePosterior:
-        """The posterior after one more trial; a pulse given alone first may be of another curve than the pairs."""
+        """The posterior after one more trial; a pulse given alone first may be of another curve than the pairs.
+
+        From where the levels of both are said not to fit, those who have learnt from such pulses are left out.
+        """
         given = self.swarm.before_pairs and bool(np.isnan(observation.isi_ms).all())
         doubted = given and observation.shift_pct_rmt is not None
         own = replace(self, swarm=self.swarm.doubting(self.model.prior.other_curve)) if doubted else self
-        return super(ParticlePosterior, own).after(observation)
+        learnt = super(ParticlePosterior, own).after(observation)
+        if learnt.swarm.halves == 1 or given:
+            return learnt
+        people = range(0, len(learnt.swarm.history.columns), learnt.swarm.halves)
+        against = np.array([against_level(learnt.swarm.history, row) or 0.0 for row in people])
+        return replace(learnt, swarm=learnt.swarm.unheeding(against >= AGAINST_A_CURVE))
 
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""
@@ -161,11 +169,11 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        prior = self.model.prior
-        latents, fields = self.swarm.picked(self.law, self.model.particles, person)
+        prior, swarm = self.model.prior, self.swarm
+        latents, fields = swarm.picked(self.law, self.model.particles, person)
 
         def profiles() -> SampledProfiles:
-            few = self.swarm.picked(self.law, self.model.thinned, person)[1]
+            few = swarm.picked(self.law, self.model.thinned, person)[1]
             sample = PersonSample(few, self.space, self.trials)
             return SampledProfiles(sample.expected_mep_mv(profile_grid(self.space))[0], sample.baselines_mv()[0])
 
@@ -180,15 +188,8 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
             unusual=Later(lambda: prior.unusual(latents, self.space)),
             change=Later(lambda: prior.change(latents).named(self.trials)),
             time_alone=Later(lambda: float((prior.of_time(latents, self.trials) & ~latents.present).mean())),
-            misfit=Later(lambda: Misfit(self.swarm.bets.worth(person), self._against_curve(person))),
+            misfit=Later(lambda: Misfit(swarm.bets.worth(person), against_level(swarm.history, person * swarm.halves))),
         )
-
-    def _against_curve(self, person: int) -> float | None:
-        """How strongly the pairs speak against the curve of pulses given alone."""
-        swarm, one = self.swarm, slice(person, person + 1)
-        prior, weights = self.model.prior, np.exp(swarm.log_weights[person]) * swarm.of_given
-        prior = prior if swarm.halves > 1 else replace(prior, other_curve=0.0)
-        return against_curve(prior, Latents._make(each[one] for each in swarm.latents), weights, swarm.history)
 
 
 def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:

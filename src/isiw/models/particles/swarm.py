@@ -39,6 +39,10 @@ OF_GIVEN = 0.3
 """As how much of a trial a pulse alone counts that was given before the pairs (decision 53)."""
 
 
+UNHEEDED = 50.0
+"""Minus the log of the probability that is left to pulses alone which the session has contradicted."""
+
+
 class Health(NamedTuple):
     """How b people's particles took a trial; fields of shape (b,)."""
 
@@ -145,6 +149,16 @@ class Swarm:
         crowd = crowd._replace(log_weights=crowd.log_weights + parts)
         return replace(self, crowd=crowd, history=History(self.history.columns.repeat(2, axis=0)), halves=2)
 
+    def unheeding(self, who: BoolArray) -> Swarm:
+        """The same where hardly a particle learns from pulses given alone, of some people (b,)."""
+        if not who.any():
+            return self
+        heeded = np.where(self.of_given, self.log_weights, -np.inf)
+        left = self.log_weights - log_sum(heeded)[:, np.newaxis] - UNHEEDED
+        log_weights = np.where(who[:, np.newaxis] & self.of_given, left, self.log_weights)
+        log_weights -= log_sum(log_weights)[:, np.newaxis]
+        return replace(self, crowd=self.crowd._replace(log_weights=log_weights))
+
     @property
     def before_pairs(self) -> bool:
         """True if no pair was learnt yet."""
@@ -168,14 +182,19 @@ class Swarm:
         """The particles after one more trial: weighed, resampled where too few carry the posterior, and moved."""
         crowd, trials = self._rows, self.trials + 1
         told = self._as_curves_have_it(trial, law, crowd)
-        elsewhere = ~np.isnan(told.columns[:: self.halves, :, BY_CURVES])
-        who = ~elsewhere | self.of_given & recruits(self.latents.noise)
-        below = probability_below(trial, self.crowd, law, who)
         sweeps = tuple(moves.sweeps_after(trials, resampled=worn) for worn in (False, True))
         learnt, found = self._learnt(told, law, crowd, (moves.min_ess, sweeps, seeds(seed, trials, len(crowd.kinds))))
         with np.errstate(invalid="ignore"):  # where there were no moves, no share of them was accepted
             health = Health(found[:, 1], found[:, 3] / found[:, 2], found[:, 5] / found[:, 4])
-        return replace(learnt, bets=self.bets.after(below), health=health)
+        return replace(learnt, bets=self._bets_after(trial, told, law), health=health)
+
+    def _bets_after(self, trial: History, told: History, law: Law) -> Bets:
+        """The bets after one more trial; none is on what counts as a part of one, whose predictions are too wide."""
+        if (told.columns[..., COUNTS] < 1).any():
+            return self.bets
+        elsewhere = ~np.isnan(told.columns[:: self.halves, :, BY_CURVES])
+        who = ~elsewhere | self.of_given & recruits(self.latents.noise)
+        return self.bets.after(probability_below(trial, self.crowd, law, who))
 
     def weighed(self, trial: History, law: Law) -> Swarm:
         """The same particles, weighed by one more trial as well."""
