@@ -115,7 +115,7 @@ def honest(
 ) -> None:
     """Compare how often each version is sure and wrong, on the people that both measured."""
     tables = [honesty(before / path.name, path) for path in sorted(now.glob("*.parquet"))]
-    sure_f1, wrong_f1 = odds.SURE_F1, summary.WRONG_F1
+    sure_f1, wrong_f1 = summary.SURE_F1, summary.WRONG_F1
     how = f"sure and wrong: an expected F1 of at least {sure_f1:g}, and at least {wrong_f1:g} above the actual one"
     _write(pd.concat(tables), now, out, how)
 
@@ -140,7 +140,7 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
         # How often it itself expects that what it is sure of is wrong altogether.
         window_told, probability = both[f"reported_window_{which}"].astype(bool), both[f"probability_{which}"]
         doubt = (1.0 - probability).where(window_told, probability)
-        rows[f"own_doubt_{which}"] = doubt.where(expected >= odds.SURE_F1, 0.0)
+        rows[f"own_doubt_{which}"] = doubt.where(expected >= summary.SURE_F1, 0.0)
         rows[f"start_{which}"], rows[f"end_{which}"] = both[f"start_covered_{which}"], both[f"end_covered_{which}"]
         rows[f"false_window_{which}"] = both[f"reported_window_{which}"].astype(float).mask(there)
         rows[f"false_sure_{which}"] = (both[f"probability_{which}"] >= 0.9).astype(float).mask(there)

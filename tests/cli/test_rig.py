@@ -280,7 +280,7 @@ def test_a_log_that_was_made_before_slips_were_refused_is_read_and_goes_on(
     isiw: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("isiw.config.session._require_used", lambda _subject: None)
-    for place in ("isiw.visit", "isiw.strategy.catalogue"):
+    for place in ("isiw.session.stated", "isiw.strategy.catalogue"):
         monkeypatch.setattr(f"{place}.require_percent", lambda *_: None)
     short = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
     (tmp_path / "c.toml").write_text(short, encoding="utf-8")
