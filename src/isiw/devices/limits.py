@@ -1,4 +1,4 @@
-"""Limits that no strategy, session or mistake can exceed, as somebody states them and logs keep them."""
+"""Limits that no strategy, session or mistake can exceed, as they are stated and logged."""
 
 from __future__ import annotations
 

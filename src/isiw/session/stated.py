@@ -1,4 +1,4 @@
-"""Checks of what somebody states for a session: that it has an effect, and the unit that is meant.
+"""Checks of what is stated for a session: that it has an effect, and the unit that is meant.
 
 What earlier logs state is not checked by these, so that it stays readable.
 """

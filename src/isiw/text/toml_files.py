@@ -1,4 +1,4 @@
-"""TOML files, read and checked: what is wrong is told by file, key and value, with the way out."""
+"""TOML files, read and checked: what is wrong is named by file, key and value, with the way out."""
 
 from __future__ import annotations
 
