@@ -23,11 +23,29 @@ from isiw.signals.plausible import before_impact, implausible_amplitude
 from isiw.signals.spans import TAP_MS
 from isiw.signals.waveforms import is_blanked, is_recording, is_saturated
 from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.text.sanitize import shown
 from isiw.trials import Status, Stimulus, Trial
 from isiw.types import FloatArray
 
 ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
 """Units of the acceleration; the impact is found in any of them."""
+
+
+def judged(answer: object, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:
+    """Judge what a device has answered, a sweep or its own measurement; arguments and errors are those of both.
+
+    Raises:
+        DeviceError: it is neither.
+    """
+    if isinstance(answer, Sweep):
+        return judge(answer, stimulus, space, limits)
+    if isinstance(answer, Measurement):
+        return judge_measurement(answer, stimulus, space, limits)
+    raise DeviceError(
+        f"the device's deliver returned {shown(answer)}",
+        expected="an isiw.Sweep or an isiw.Measurement",
+        remedy="Let it return what it recorded, or the MEP that it measured: isiw.Measurement(mep_mv, isi_ms).",
+    )
 
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:
