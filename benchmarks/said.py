@@ -37,7 +37,7 @@ from isiw.report.evidence import ENOUGH_ON_EACH_SIDE, changed_with_time
 from isiw.report.words import Role, Said, in_lines, statement
 from isiw.session.examination import recorded
 from isiw.session.loop import Session
-from isiw.signals.amplitudes import Doubts, counted_of
+from isiw.signals.plausible import Doubts, counted_of
 from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.subjects.cohorts import person_of

@@ -15,7 +15,7 @@ from typing import Final
 
 import hatch_build
 
-from isiw.native import library
+from isiw.native import engine
 
 ROOT: Final = Path(hatch_build.__file__).parent
 TAKEN: Final = "ISIW_SANITIZED_LIBRARY"
@@ -60,4 +60,4 @@ def run(arguments: Sequence[str | Path], folder: Path) -> subprocess.CompletedPr
 
 def take() -> None:
     """Have this process use the library that checks itself."""
-    library._PATH = Path(os.environ[TAKEN])  # type: ignore[misc] # noqa: SLF001 - isiw itself loads no other one
+    engine._PATH = Path(os.environ[TAKEN])  # type: ignore[misc] # noqa: SLF001 - isiw itself loads no other one

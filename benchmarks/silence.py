@@ -22,7 +22,7 @@ import isiw
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.design import VALVE_SPACE
-from isiw.signals.amplitudes import stopped_after
+from isiw.signals.plausible import stopped_after
 from isiw.types import FloatArray
 
 RESULTS = Path(__file__).parent / "results" / "silence"

@@ -6,6 +6,10 @@ Counted are the modules of isiw in which a function runs from the moment at whic
 until the strategy has learnt the trial, besides those of `models` and `acquisition`, which is the science. With
 `--whole` it is from the end of one trial to the end of the next, with estimate, decision, and the ask. The trial is an
 ordinary one of the default; earlier ones have loaded what is loaded when it is used first.
+
+Then come the rooms that the session hands the trial to, in order, and how often the way returns to each: it enters a
+room again after another one. The session itself, which goes from room to room, is none of them, nor are rooms of values
+(`VALUES`), of which all others are made.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ import os
 import sys
 import tempfile
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,12 +39,17 @@ PROFILED = 10
 
 SCIENCE = ("isiw.models", "isiw.acquisition")
 
+VALUES = {"change", "decision", "design", "estimate", "excess", "figures", "findings", "summary", "sweeps", "trials"}
+VALUES |= {"checks", "errors", "files", "lazy", "text", "types", "visit", "window"}
+"""Rooms that hold values, or what all rooms use."""
+
 
 class Way:
     """The modules in which functions run while it is open, in any thread, in the order of their first one."""
 
     def __init__(self, *, whole: bool) -> None:
         self.modules: list[str] = []
+        self.rooms: list[str] = [] if whole else ["devices"]
         self.whole, self.is_open = whole, False
 
     @contextmanager
@@ -54,9 +64,31 @@ class Way:
             threading.setprofile(None)
 
     def _seen(self, frame: FrameType, event: str, _: object) -> None:
-        name = frame.f_globals.get("__name__", "")
-        if self.is_open and event == "call" and name.startswith("isiw.") and name not in self.modules:
+        name = _module(frame)
+        if not (self.is_open and event == "call" and name.startswith("isiw.")):
+            return
+        if name not in self.modules:
             self.modules.append(name)
+        room = name.split(".")[1]
+        if room not in VALUES | {"session"} and _handed_over(frame) and self.rooms[-1:] != [room]:
+            self.rooms.append(room)
+
+    @property
+    def returns(self) -> dict[str, int]:
+        """How often the way returns to each room."""
+        return {room: times - 1 for room, times in Counter(self.rooms).items()}
+
+
+def _module(frame: FrameType) -> str:
+    return str(frame.f_globals.get("__name__", ""))
+
+
+def _handed_over(frame: FrameType) -> bool:
+    """Whether the session made a call, or the thread that works for it: no other room is between."""
+    caller = frame.f_back
+    while caller is not None and not _module(caller).startswith("isiw."):
+        caller = caller.f_back
+    return caller is None or _module(caller).startswith("isiw.session.")
 
 
 class Watched:
@@ -91,8 +123,8 @@ class Watched:
         """Let go."""
 
 
-def way_of_a_trial(*, whole: bool) -> list[str]:
-    """The modules that a trial passes, in order.
+def way_of_a_trial(*, whole: bool) -> Way:
+    """The way of a trial.
 
     Args:
         whole: whether from one trial's end to the next one's, and not only from the device to the posterior.
@@ -121,17 +153,20 @@ def way_of_a_trial(*, whole: bool) -> list[str]:
             ).run()
     finally:
         Course.after = update  # type: ignore[method-assign]
-    return way.modules
+    return way
 
 
 def main() -> None:
-    """Print the modules in order, and how many there are."""
+    """Print the modules and the rooms in order, how many modules there are, and how often the way returns."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--whole", action="store_true")
-    modules = way_of_a_trial(whole=parser.parse_args().whole)
+    way = way_of_a_trial(whole=parser.parse_args().whole)
+    modules = way.modules
     shell = [name for name in modules if not name.startswith(SCIENCE)]
     print("\n".join(shell))
     print(f"{len(shell)} modules, and {len(modules) - len(shell)} of models and acquisition")
+    returns = ", ".join(f"{times} to {room}" for room, times in way.returns.items())
+    print(f"Rooms: {' → '.join(way.rooms)}\nReturns: {returns}")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from isiw.findings import Finding
-from isiw.signals.amplitudes import Counted
+from isiw.signals.plausible import Counted
 from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.sweeps import Measurement, Sweep

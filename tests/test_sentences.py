@@ -11,8 +11,9 @@ import pytest
 from isiw import sentences, summary
 from isiw.design import DesignSpace
 from isiw.figures import Edge, Estimate
-from isiw.findings import NO_MEP, Kind
+from isiw.findings import Kind
 from isiw.report.words import counts
+from isiw.summary import NO_MEP
 from isiw.text.stimuli import STIMULI, TAP
 from isiw.trials import Status, Stimulus, Trial
 from isiw.window import Window

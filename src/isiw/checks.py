@@ -7,10 +7,9 @@ pydantic reads it from files and requests by the same checks, so that an error n
 
 from __future__ import annotations
 
-import inspect
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import fields
 from functools import cache, partial
@@ -140,12 +139,6 @@ def mean_and_sd(what: str, value: object) -> tuple[float, float]:
     return mean, sd
 
 
-def require_sum_of_one(what: str, shares: Iterable[float]) -> None:
-    """Raise if probabilities that exclude each other do not sum to 1."""
-    if not math.isclose(total := math.fsum(shares), 1.0, abs_tol=1e-6):
-        raise InvalidValueError(f"{what} must sum to 1", got=total)
-
-
 def text(what: str, value: object) -> str:
     """A text."""
     if not isinstance(value, str):
@@ -157,21 +150,6 @@ def text(what: str, value: object) -> str:
 def code(what: str, value: object) -> str:
     """A person's code; spaces around it, which nobody sees, make nobody else of the same person."""
     return text(what, value).strip()
-
-
-def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:
-    """An instance of a dataclass."""
-    if isinstance(table, kind):
-        return table
-    if not isinstance(table, Mapping):
-        raise InvalidValueError(f"{what} must be a table", got=table)
-    parameters = inspect.signature(kind)
-    try:
-        given = parameters.bind(**table)
-    except TypeError as error:
-        remedy = f"Its keys are {', '.join(parameters.parameters)}."
-        raise InvalidValueError(f"the table {what}: {error}", got=dict(table), remedy=remedy) from error
-    return kind(*given.args, **given.kwargs)
 
 
 def fields_of(kind: type, value: object) -> dict[str, Any]:

@@ -12,9 +12,8 @@ from isiw.change import Change, Misfit
 from isiw.checks import Checked, Share, number
 from isiw.errors import InvalidValueError
 from isiw.figures import BestISI, Edge, Estimate
-from isiw.findings import lacking
 from isiw.lazy import WorkedOut
-from isiw.summary import summary
+from isiw.summary import lacking, summary
 from isiw.types import ArrayLike, FloatArray, IntArray
 from isiw.window import Interval, Window
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
 
 from isiw.errors import InvalidValueError, IsiwError
-
-ENOUGH_PAIRS: Final = 3
-"""With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
 
 
 class Severity(StrEnum):
@@ -132,45 +129,6 @@ def refused(
     return error(finding.text, got=got, expected=expected, remedy=finding.remedy or None, found=finding.kind)
 
 
-NO_MEP: Final = Finding(
-    Kind.SILENT, Severity.NOTE, "No MEP was seen in any trial that counts, so nothing is known about a window"
-)
-TOO_FEW: Final = Finding(
-    Kind.FEW_PAIRS, Severity.NOTE, "Fewer than three pairs of stimuli count so far, too few to speak of a window"
-)
-
-
-IN_DOUBT: Final = Finding(
-    Kind.ISIS_FAR,
-    Severity.DOUBT,
-    "Realised ISIs were reported that are far from those that were asked for, so nothing is said about a window",
-    "Until they are confirmed or excluded, these trials do not count.",
-)
-
-
-def lacking(pairs: int | None, *, silent: bool, in_doubt: bool = False) -> Finding | None:
-    """The finding that too little was measured, or too doubtful, to speak of a window; None if enough was."""
-    if in_doubt:
-        return IN_DOUBT
-    if silent:
-        return NO_MEP
-    return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW
-
-
-MANY_BELOW_MV: Final = 0.02
-"""Of a detection limit from here on, amplitudes of 0 are usual: most pulses below the threshold evoke less."""
-
-
-def zeros_are_usual(detection_limit_mv: float | None) -> bool:
-    """Whether amplitudes of 0 say little, since much is below the detection limit."""
-    return detection_limit_mv is not None and detection_limit_mv >= MANY_BELOW_MV
-
-
-def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> bool:
-    """Whether enough amplitudes count, and each is 0, where the detection limit is too low for that."""
-    return len(meps_mv) >= ENOUGH_PAIRS and not zeros_are_usual(detection_limit_mv) and not any(meps_mv)
-
-
 @dataclass(frozen=True)
 class UnitScale:
     """A quantity's possible values, its usual one, and the unit and factor that smaller and larger ones were in."""
@@ -193,11 +151,6 @@ class UnitScale:
         """Raise if a value is probably in another unit."""
         if (slip := self.slip(value)) is not None:
             raise InvalidValueError(what, got=value if got is None else got, expected=expected, remedy=slip)
-
-    def likely_unit(self, values: Mapping[str, float]) -> str | None:
-        """The unit in which a value would be nearest to the usual one; None if none makes it possible."""
-        possible = {unit: value for unit, value in values.items() if self.least <= value <= self.most}
-        return min(possible, key=lambda unit: abs(math.log(possible[unit] / self.usual)), default=None)
 
 
 AMPLITUDE_MV: Final = UnitScale(2e-4, 30.0, ("V", 1000), ("µV", 1000))

@@ -1,15 +1,17 @@
-"""The words in which an estimate prints itself; what more is said about a result is in `sentences`."""
+"""The words in which an estimate prints itself, and that too little is known for one; more is said in `sentences`."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from dataclasses import fields
 from typing import Final
 
 from isiw.change import Change
 from isiw.figures import Estimate
-from isiw.text.stimuli import STIMULI, StimulusWords, words_of
-
-_EITHER: Final = words_of(STIMULI)
+from isiw.findings import Finding, Kind, Severity
+from isiw.text.stimuli import STIMULI, TAP, StimulusWords
+from isiw.types import Conditioning
 
 SURE = 0.95
 """Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
@@ -18,6 +20,37 @@ LEAST_FACTOR = 3.0
 """Bayes factor below which trials hardly speak for a window: "not worth more than a bare mention" [Kass1995]."""
 
 JUDGED_SINCE: Final = "Trials were excluded or included after this estimate; isiw estimate LOG computes it again."
+
+
+ENOUGH_PAIRS: Final = 3
+"""With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
+
+
+NO_MEP: Final = Finding(
+    Kind.SILENT, Severity.NOTE, "No MEP was seen in any trial that counts, so nothing is known about a window"
+)
+
+
+TOO_FEW: Final = Finding(
+    Kind.FEW_PAIRS, Severity.NOTE, "Fewer than three pairs of stimuli count so far, too few to speak of a window"
+)
+
+
+IN_DOUBT: Final = Finding(
+    Kind.ISIS_FAR,
+    Severity.DOUBT,
+    "Realised ISIs were reported that are far from those that were asked for, so nothing is said about a window",
+    "Until they are confirmed or excluded, these trials do not count.",
+)
+
+
+def lacking(pairs: int | None, *, silent: bool, in_doubt: bool = False) -> Finding | None:
+    """The finding that too little was measured, or too doubtful, to speak of a window; None if enough was."""
+    if in_doubt:
+        return IN_DOUBT
+    if silent:
+        return NO_MEP
+    return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW
 
 
 def rules_out(probability: float | None) -> bool:
@@ -38,6 +71,21 @@ def edge_text(edge_ms: float) -> str:
     if math.isinf(edge_ms):
         return "before the range" if edge_ms < 0 else "beyond the range"
     return f"{edge_ms:.0f} ms"
+
+
+def words_of(stimuli: Iterable[Conditioning]) -> StimulusWords:
+    """The words for all stimuli of some sessions; of none of them, those for the tap."""
+    given = set(stimuli)
+    several = [words for stimulus, words in STIMULI.items() if stimulus in given] or [TAP]
+    joined = {
+        field.name: " or ".join(dict.fromkeys(getattr(words, field.name) for words in several))
+        for field in fields(StimulusWords)
+        if field.name != "by_valve"
+    }
+    return StimulusWords(**joined, by_valve=any(words.by_valve for words in several))
+
+
+_EITHER: Final = words_of(STIMULI)
 
 
 def in_short(estimate: Estimate) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -57,19 +57,6 @@ class Stimulus(Checked):
         if self.tap_alone and self.isi_ms is not None:
             raise InvalidValueError("a tap alone has no ISI", got=self.isi_ms, expected="None")
         require_pulse(self.intensity_pct_rmt, tap_alone=self.tap_alone)
-
-
-def require_trials(trials: object) -> tuple[Trial, ...]:
-    """Earlier trials, each of which must be a `Trial`."""
-    given = tuple(trials) if isinstance(trials, Iterable) else (trials,)
-    for trial in given:
-        if not isinstance(trial, Trial):
-            raise InvalidValueError(
-                "earlier trials must be of the type isiw.Trial",
-                got=trial,
-                remedy="Of a log they are isiw.read_session(log).table; its .trials is a table of pandas.",
-            )
-    return given
 
 
 def require_pulse(intensity_pct_rmt: float | None, *, tap_alone: bool) -> None:

@@ -19,7 +19,7 @@ from benchmarks.pulse_peer import PEER_COMMANDS, PulsePeer
 from benchmarks.recording_device import RecordingDevice
 
 import isiw
-from isiw.devices.info import NOT_PROTECTED
+from isiw.devices.protocol import NOT_PROTECTED
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.log.headers import ANY_HEADER, Header
 from isiw.report.tables import first_facts

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from isiw.devices.transports.exchange import read_number
 from isiw.errors import InvalidValueError
 from isiw.existing import Delivered, Layout, ReadingLimits, doubts, read_people
 from isiw.existing.answer import Answer, read_answer, write_answer, write_error
@@ -21,7 +22,6 @@ from isiw.existing.limits import LARGEST_FACTOR, require_file, seconds_for
 from isiw.existing.quantities import Columns, unit_said
 from isiw.sweeps import Channel
 from isiw.text.parsing import DoubledKeyError, once_each
-from isiw.text.sanitize import read_number
 from isiw.trials import Status, Trial, TrialTable
 from isiw.visit import Visit
 

@@ -14,7 +14,7 @@ import pytest
 import isiw
 from isiw.errors import OtherVersionsWarning
 from isiw.findings import Kind
-from isiw.native.library import version
+from isiw.native.engine import version
 from isiw.plots import session_figure
 from isiw.report import final_statement
 from isiw.session.replay import strategy_of

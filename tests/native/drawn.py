@@ -10,6 +10,7 @@ import numpy as np
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.models.particles import jumps, latents
 from isiw.models.particles.changes import ChangeKind
+from isiw.models.particles.compiled import Law
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.places import Place
@@ -19,8 +20,7 @@ from isiw.models.particles.supra import jumps as supra_jumps
 from isiw.models.particles.supra import prior as supra_prior
 from isiw.models.shared.history import Circumstances, History
 from isiw.models.shared.scales import Scale
-from isiw.native.law import Law
-from isiw.native.library import COLUMNS
+from isiw.native.engine import COLUMNS
 from isiw.types import Singles
 from native import reference
 

@@ -14,6 +14,7 @@ import numpy as np
 from benchmarks import sanitized
 from isiw.design import DesignSpace
 from isiw.models.particles.changes import ChangePrior
+from isiw.models.particles.compiled import Crowd
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.places import Place
 from isiw.models.particles.predictions import PersonSample
@@ -25,7 +26,6 @@ from isiw.models.shared.history import Circumstances, History, neutral
 from isiw.models.shared.scales import Scale
 from isiw.models.windows import Runs, best_window, grid_of
 from isiw.native.engine import entropy_reductions, log_likelihoods, variance_reductions
-from isiw.native.law import Crowd
 from native.drawn import Case, seeds
 
 TRIALS = (0, 1, 2, 15, 16, 17, 63, 64, 65, 127, 128, 129, 257)

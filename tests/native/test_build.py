@@ -12,7 +12,7 @@ import pytest
 import wheels
 
 from isiw.errors import IsiwError
-from isiw.native.library import require_built_of
+from isiw.native.engine import require_built_of
 
 LIBRARY = hatch_build.NATIVE / hatch_build.here().file
 LINUX = hatch_build.TARGETS["linux-x86_64"]

@@ -12,6 +12,7 @@ from hatch_build import SOURCES
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.excess import LEAST_DEPRESSED_MV, least_excess_mv
 from isiw.models.particles import records
+from isiw.models.particles.compiled import Crowd
 from isiw.models.particles.latents import BLOCKS
 from isiw.models.particles.model import ParticleModel
 from isiw.models.particles.predictions import PersonSample
@@ -21,9 +22,7 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.shared.draws import LEVELS
 from isiw.models.shared.history import Circumstances
 from isiw.native import engine
-from isiw.native.engine import log_likelihoods
-from isiw.native.law import Crowd
-from isiw.native.library import COLUMNS, FIELDS, UNKNOWN
+from isiw.native.engine import COLUMNS, FIELDS, UNKNOWN, log_likelihoods
 from native import reference
 from native.drawn import CASES, PLACES, Case, columns, seeds, trials
 

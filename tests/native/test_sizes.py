@@ -11,11 +11,11 @@ from benchmarks import sanitized
 BEYOND = """
 import numpy as np
 from benchmarks import sanitized
-from isiw.native import library
+from isiw.native import engine
 sanitized.take()
-sizes = library.FIELDS, 23, 24
+sizes = engine.FIELDS, 23, 24
 given = [np.zeros(size, dtype=np.float32) for size in sizes]
-library.call("evoked_means", 1, 24, *(array.__array_interface__["data"][0] for array in given))
+engine.call("evoked_means", 1, 24, *(array.__array_interface__["data"][0] for array in given))
 """
 
 pytestmark = [

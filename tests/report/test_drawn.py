@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from isiw.change import Change
-from isiw.findings import TOO_FEW
 from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
 from isiw.report.words import final_statement
+from isiw.summary import TOO_FEW
 from isiw.sweeps import Channel
 from known import known
 from report.sessions import pulsed, tapped

@@ -13,8 +13,8 @@ import isiw
 from isiw import sentences
 from isiw.decision import StopDecision, StopKind
 from isiw.errors import LogError
-from isiw.findings import NO_MEP
 from isiw.report.evidence import changed_with_time, contradiction, growth, no_comparison, nothing_stood_out, p_of_larger
+from isiw.summary import NO_MEP
 from isiw.trials import Status, Trial
 from isiw.window import Window
 from scripted import scripted_strategy

@@ -13,7 +13,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, LogError
-from isiw.findings import IN_DOUBT, TOO_FEW, Kind
+from isiw.findings import Kind
 from isiw.log.record import read_session
 from isiw.log.schema import Record
 from isiw.log.writer import encode
@@ -24,7 +24,7 @@ from isiw.server.sessions import Sessions
 from isiw.session.afterwards import exclude
 from isiw.session.examination import Examination
 from isiw.strategy.catalogue import make_strategy
-from isiw.summary import JUDGED_SINCE
+from isiw.summary import IN_DOUBT, JUDGED_SINCE, TOO_FEW
 from server.serving import PLAN, SETTINGS, SEVERAL, SPACE, client_of, created, done, mep_mv, refused, told
 
 

@@ -13,9 +13,8 @@ from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
 from isiw.log.record import read_session
 from isiw.log.schema import Intent, Record
-from isiw.session.interrupts import Interrupts
 from isiw.session.loop import Session
-from isiw.session.pausing import Asking
+from isiw.session.pausing import Asking, Interrupts
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate, Sink
 from isiw.session.steps import pace_s

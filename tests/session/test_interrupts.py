@@ -9,7 +9,7 @@ from typing import Never
 
 import pytest
 
-from isiw.session.interrupts import Interrupts
+from isiw.session.pausing import Interrupts
 
 if os.name == "nt":
     pytest.skip("POSIX signals", allow_module_level=True)
@@ -177,7 +177,7 @@ def test_signals_that_come_at_once_do_not_pass_for_a_session_that_does_not_react
         for _ in range(2):
             signal.pthread_kill(threading.get_ident(), signal.SIGINT)
 
-    monkeypatch.setattr("isiw.session.interrupts._REACTION_S", 0.5)
+    monkeypatch.setattr("isiw.session.pausing._REACTION_S", 0.5)
     disarmed, stuck = list[str](), list[str]()
 
     def disarm() -> None:

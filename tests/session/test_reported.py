@@ -11,7 +11,7 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.errors import ImplausibleDataWarning, InvalidValueError
-from isiw.findings import IN_DOUBT, Kind
+from isiw.findings import Kind
 from isiw.log.record import SessionRecord, read_session
 from isiw.plots import session_figure
 from isiw.report import final_statement
@@ -20,6 +20,7 @@ from isiw.session.recorder import Recorder
 from isiw.session.resume import open_session
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
+from isiw.summary import IN_DOUBT
 
 SPACE = DesignSpace(20, 320, reference="impact")
 

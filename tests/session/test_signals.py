@@ -16,10 +16,10 @@ import pytest
 from forked import Forked
 from isiw.decision import StopKind
 from isiw.log.record import read_session
-from isiw.session.interrupts import INTERRUPTED, Interrupts
 from isiw.session.loop import Session
+from isiw.session.pausing import Interrupts
 from isiw.session.resume import resume
-from isiw.session.rig import Safeguards
+from isiw.session.rig import INTERRUPTED, Safeguards
 from isiw.session.sink import SessionUpdate
 from isiw.sweeps import Measurement
 from isiw.trials import Stimulus

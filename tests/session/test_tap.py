@@ -13,7 +13,7 @@ from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.log.record import read_session
 from isiw.log.schema import Event, Intent
-from isiw.session import own_response
+from isiw.session import steps
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.rig import Safeguards
@@ -115,7 +115,7 @@ def test_a_session_that_ends_between_a_trial_and_its_corrections_has_them_once_i
 
     whole = ran(made(), tmp_path / "whole.mcap", few(), protocol=NO_TAPS)
     with monkeypatch.context() as dying:
-        dying.setattr(own_response, "correction", dies)
+        dying.setattr(steps, "correction", dies)
         with pytest.raises(KeyboardInterrupt):
             ran(made(), log, few(), protocol=NO_TAPS)
     before = read_session(log)
@@ -159,10 +159,10 @@ def test_where_a_reflex_may_explain_a_window_a_longer_isi_is_asked_that_shows_it
     for seed in (3, 4, 5, 6):
         session = of_a_reflex(0.1, seed, log.parent, NO_TAPS, max_trials=14)
         record = read_session(session.log_path)
-        fallbacks = [event for event in record.events if event.kind == "fallback" and event.text == own_response.LONGER]
+        fallbacks = [event for event in record.events if event.kind == "fallback" and event.text == steps.LONGER]
         estimates = {estimate.trial: estimate for estimate in record.estimates}
         for number in (known(event.trial) for event in fallbacks):
-            assert known(estimates[number - 1].probability) >= own_response.LEAST_PROBABILITY
+            assert known(estimates[number - 1].probability) >= steps.LEAST_PROBABILITY
             last_met_ms = 20.0 + 8 * seed + 30.0 - 15.0  # a longer ISI has its MEP window after the reflex
             assert known(record.table[number].commanded_isi_ms) > last_met_ms
         asked += bool(fallbacks)
@@ -180,7 +180,7 @@ def test_no_session_stops_on_a_window_that_a_longer_isi_could_show_to_be_a_refle
 def test_a_session_that_wants_longer_isis_stops_all_the_same_when_its_budget_is_used_up(
     log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(own_response.OwnResponse, "least_isi_ms", 100.0)
+    monkeypatch.setattr(steps.OwnResponse, "least_isi_ms", 100.0)
     strategy = make_strategy(space=IMPACT, max_trials=5, particles=100, stop_no_window=0.01)
     limits = Limits.of_space(IMPACT, max_pulses=9)
     session = ran(TapRig(tap_alone=False), log, strategy, protocol=NO_TAPS, limits=limits)

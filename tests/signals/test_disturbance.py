@@ -9,9 +9,8 @@ from isiw.design import DesignSpace
 from isiw.findings import Kind, Severity
 from isiw.signals import SignalLimits, judge
 from isiw.signals.mep import at_rest, disturbance
-from isiw.signals.places import shown_by
 from isiw.signals.rig import Evidence
-from isiw.signals.watch import findings
+from isiw.signals.watch import findings, shown_by
 from isiw.sweeps import Channel, Sweep
 from isiw.trials import Stimulus, Trial
 from known import known

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.findings import is_silent
-from isiw.signals import amplitudes, places
-from isiw.signals.amplitudes import Counted, Response, large, silent, small, stopped
+from isiw.signals import plausible, watch
 from isiw.signals.limits import SignalLimits
+from isiw.signals.plausible import Counted, Response, is_silent, large, silent, small, stopped
 from isiw.signals.watch import Watch
 from isiw.strategy.outcomes import Outcome, Outcomes, found_step_mv
 from isiw.sweeps import Measurement
@@ -31,24 +30,24 @@ def kinds_plainly(series: tuple[Counted, ...]) -> set[str]:
     """What is found in some amplitudes by going through all of them."""
     found, meps_mv = set[str](), [one.mep_mv for one in series]
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
-    if len(meps_mv) >= amplitudes.SILENT_FROM_THE_START and is_silent(meps_mv):
+    if len(meps_mv) >= plausible.SILENT_FROM_THE_START and is_silent(meps_mv):
         found.add("silent")
-    if amplitudes.stopped_after([one.isi_ms for one in series], [one.stands_out for one in series]) is not None:
+    if plausible.stopped_after([one.isi_ms for one in series], [one.stands_out for one in series]) is not None:
         found.add("stopped")
-    if len(seen) >= amplitudes.IN_A_ROW and max(seen[-amplitudes.IN_A_ROW :]) < amplitudes.SMALL_MV:
+    if len(seen) >= plausible.IN_A_ROW and max(seen[-plausible.IN_A_ROW :]) < plausible.SMALL_MV:
         found.add("small")
-    usual_mv = statistics.geometric_mean(seen[-amplitudes.IN_A_ROW :]) if len(seen) >= amplitudes.IN_A_ROW else 0.0
-    if usual_mv >= amplitudes.LARGE_MV:
-        earlier = seen[: -amplitudes.IN_A_ROW]
-        if not earlier or usual_mv / statistics.median(earlier) >= amplitudes.JUMP:
+    usual_mv = statistics.geometric_mean(seen[-plausible.IN_A_ROW :]) if len(seen) >= plausible.IN_A_ROW else 0.0
+    if usual_mv >= plausible.LARGE_MV:
+        earlier = seen[: -plausible.IN_A_ROW]
+        if not earlier or usual_mv / statistics.median(earlier) >= plausible.JUMP:
             found.add("large")
     since = next((n for n, one in enumerate(series[::-1]) if one.rest_uv and one.stands_out), len(series))
     outside = [one.outside for one in series[::-1][:since] if one.outside is not None]
-    alike = next((n for n, one in enumerate(outside) if abs(one.at_ms - outside[0].at_ms) > places.ALIKE_MS), 99)
+    alike = next((n for n, one in enumerate(outside) if abs(one.at_ms - outside[0].at_ms) > watch.ALIKE_MS), 99)
     isis_ms = [one.isi_ms for one in series[::-1][:since] if one.outside is not None][:alike]
     pairs_ms = [isi_ms for isi_ms in isis_ms if isi_ms is not None]
-    differ = len(pairs_ms) < len(isis_ms) or max(pairs_ms) - min(pairs_ms) >= places.DIFFERING_MS if isis_ms else False
-    if len(isis_ms) >= places.IN_A_ROW and differ:
+    differ = len(pairs_ms) < len(isis_ms) or max(pairs_ms) - min(pairs_ms) >= watch.DIFFERING_MS if isis_ms else False
+    if len(isis_ms) >= watch.IN_A_ROW and differ:
         found.add("misplaced")
     return found
 
@@ -65,8 +64,8 @@ def test_what_is_odd_is_found_as_by_a_look_at_all_amplitudes() -> None:
         plain = kinds_plainly(series)
         found = {name for name, check in checks.items() if check(series) is not None}
         assert found == plain - {"misplaced"}
-        isis_ms = [isi_ms for isi_ms, _ in places._last_alike(series)]  # noqa: SLF001 - what it is found by
-        follows = len(isis_ms) >= places.IN_A_ROW and places._follow_the_pulse(isis_ms)  # noqa: SLF001 - the same
+        isis_ms = [isi_ms for isi_ms, _ in watch._last_alike(series)]  # noqa: SLF001 - what it is found by
+        follows = len(isis_ms) >= watch.IN_A_ROW and watch._follow_the_pulse(isis_ms)  # noqa: SLF001 - the same
         assert follows == ("misplaced" in plain)
         met |= plain
     assert met == {*checks, "misplaced"}

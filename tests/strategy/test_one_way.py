@@ -26,7 +26,7 @@ from isiw.session.examination import examination_of, relearned
 from isiw.session.replay import replay
 from isiw.session.sink import Sink
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.known import Known
+from isiw.strategy.course import Known
 from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession
 from isiw.studies.sessions import _Batch

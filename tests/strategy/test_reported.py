@@ -11,9 +11,10 @@ from isiw.decision import StopKind
 from isiw.design import DesignSpace
 from isiw.errors import ImplausibleDataWarning, InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.findings import IN_DOUBT, Kind
+from isiw.findings import Kind
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
+from isiw.summary import IN_DOUBT
 from isiw.trials import Trial
 
 SPACE = DesignSpace(20, 320, reference="impact")

@@ -13,11 +13,11 @@ from isiw.decision import StopDecision, StopKind
 from isiw.dissertation.strategies import Converging, Passing, Settling
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.findings import NO_MEP
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.decisions import Progress, StoppingRule, looks_back, stimuli_left
 from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain
 from isiw.strategy.strategy import Strategy
+from isiw.summary import NO_MEP
 
 
 def progress(delivered: int = 3, probability: float | None = 0.95, edges_ms: object = None) -> Progress:

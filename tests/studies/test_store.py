@@ -12,7 +12,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, StudyError
-from isiw.native import library
+from isiw.native import engine
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Unit, load_study
 from isiw.studies.store import Store, begin_store, code_checksum, open_store
@@ -41,7 +41,7 @@ def test_a_unit_is_left_until_it_is_kept(store: Store) -> None:
 
 def test_a_study_is_not_continued_with_another_engine(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     store.require_same_code()
-    monkeypatch.setattr(library, "sources", lambda: "0123456789abcdef")
+    monkeypatch.setattr(engine, "sources", lambda: "0123456789abcdef")
     code_checksum.cache_clear()
     try:
         with pytest.raises(StudyError, match="isiw was changed since"):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from isiw.text.sanitize import read_number, read_whole
+from isiw.devices.transports.exchange import read_number
+from isiw.text.sanitize import read_whole
 
 
 @pytest.mark.parametrize(

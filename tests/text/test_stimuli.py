@@ -1,6 +1,7 @@
 from __future__ import annotations
 
-from isiw.text.stimuli import STIMULI, TAP, meanings, words_of
+from isiw.summary import words_of
+from isiw.text.stimuli import STIMULI, TAP, meanings
 
 
 def test_sessions_with_one_stimulus_have_its_words_and_sessions_with_both_have_both() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from isiw.checks import Checked, Count, Flag, MeanAndSd, NonNegative, Number, Positive, Text, text
 from isiw.errors import InvalidValueError
@@ -12,8 +12,6 @@ from isiw.types import Conditioning, Reference
 
 Guard: TypeAlias = Literal["watchdog", "heartbeat"]
 """What disarms a device if isiw dies."""
-
-NOT_PROTECTED: Final = "not protected if isiw dies"
 
 
 @dataclass(frozen=True)
@@ -88,10 +86,3 @@ class Readiness(Checked):
     reason: str = ""
     coil_c: Number | None = None
     intensity_pct_mso: NonNegative | None = None
-
-
-def unprotected(info: DeviceInfo) -> str | None:
-    """A sentence for whoever arms a device that stays armed if isiw dies; None for any other."""
-    if info.simulated or info.if_isiw_dies is not None:
-        return None
-    return f"{info.name} is {NOT_PROTECTED}: what is armed then stays armed. Keep the switch of the stimulator at hand."

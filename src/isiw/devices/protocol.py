@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Final, Protocol, TypeAlias, runtime_checkable
 
 from isiw.devices.info import DeviceInfo, Readiness
 from isiw.errors import DeviceError, NotDelivered
@@ -111,6 +111,16 @@ def require_staged(name: str, *, staged: bool) -> None:
     """Raise NotDelivered if a device is to deliver without being armed."""
     if not staged:
         raise NotDelivered(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")
+
+
+NOT_PROTECTED: Final = "not protected if isiw dies"
+
+
+def unprotected(info: DeviceInfo) -> str | None:
+    """A sentence for whoever arms a device that stays armed if isiw dies; None for any other."""
+    if info.simulated or info.if_isiw_dies is not None:
+        return None
+    return f"{info.name} is {NOT_PROTECTED}: what is armed then stays armed. Keep the switch of the stimulator at hand."
 
 
 class CallbackDevice:

@@ -24,8 +24,9 @@ from isiw.log.records import Onset
 from isiw.log.salvage import only_in, salvage_file
 from isiw.log.schema import Event
 from isiw.log.verdicts import VERDICTS
+from isiw.summary import words_of
 from isiw.text.sanitize import counted
-from isiw.text.stimuli import StimulusWords, words_of
+from isiw.text.stimuli import StimulusWords
 
 _FIRST_DAY: Final = dt.date(1900, 1, 1)
 _DAYS: Final = 20 * 365

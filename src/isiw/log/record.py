@@ -8,7 +8,6 @@ from pathlib import Path
 
 from isiw.decision import StopDecision
 from isiw.errors import InvalidValueError, LogError
-from isiw.findings import is_silent, lacking
 from isiw.lazy import pd
 from isiw.log import reader
 from isiw.log.frames import trial_frame
@@ -17,7 +16,8 @@ from isiw.log.reader import LoggedSession, ThresholdRecord, topics_of
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import EstimateRecord, Event
 from isiw.log.verdicts import VERDICTS, doubted_by
-from isiw.summary import JUDGED_SINCE, summary
+from isiw.signals.plausible import is_silent
+from isiw.summary import JUDGED_SINCE, lacking, summary
 from isiw.text.sanitize import command
 
 

@@ -31,8 +31,7 @@ from isiw.plots.style import (
     tidied,
 )
 from isiw.sentences import TOO_LITTLE
-from isiw.summary import in_short
-from isiw.text.stimuli import words_of
+from isiw.summary import in_short, words_of
 from isiw.types import FloatArray
 
 StudyPicture: TypeAlias = Literal["f1", "frontier", "coverage", "latency"]

@@ -21,7 +21,7 @@ from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, EventKind
 from isiw.report.tables import lost_rows
 from isiw.report.words import counts_sentence
-from isiw.signals.agreement import contradicts_its_times, timed_isi_ms
+from isiw.signals.judgement import contradicts_its_times, timed_isi_ms
 from isiw.text.sanitize import counted
 from isiw.trials import Trial
 from isiw.types import FloatArray

@@ -8,13 +8,12 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.figures import Edge
-from isiw.findings import lacking
 from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.tables import trial_row
 from isiw.report.words import answer_and_warnings
 from isiw.signals.limits import EMG_UNITS_MV
-from isiw.summary import tap_unmeasured
+from isiw.summary import lacking, tap_unmeasured
 from isiw.sweeps import Channel
 from isiw.text.sanitize import plain
 from isiw.trials import Trial

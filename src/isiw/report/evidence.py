@@ -11,9 +11,9 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from isiw import sentences
-from isiw.findings import IN_DOUBT, NO_MEP
 from isiw.log.record import SessionRecord
-from isiw.signals.amplitudes import counted_of, stopped_after
+from isiw.signals.plausible import counted_of, stopped_after
+from isiw.summary import IN_DOUBT, NO_MEP
 from isiw.trials import Trial
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window

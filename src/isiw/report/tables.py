@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
-from isiw.devices.info import NOT_PROTECTED, unprotected
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import NOT_PROTECTED, unprotected
 from isiw.findings import Kind
 from isiw.log.record import SessionRecord
 from isiw.log.schema import Event, Intent

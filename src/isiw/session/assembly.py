@@ -22,7 +22,7 @@ from isiw.intervention import Intervention
 from isiw.log.headers import FirstStep, Header, StrategyRecipe
 from isiw.log.places import log_of
 from isiw.log.writer import now
-from isiw.native.library import version as engine_version
+from isiw.native.engine import version as engine_version
 from isiw.pairing.agenda import Agenda
 from isiw.pairing.fitting import require_possible, require_settable
 from isiw.session.blocks import Blocks

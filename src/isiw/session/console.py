@@ -13,7 +13,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.devices.info import unprotected
+from isiw.devices.protocol import unprotected
 from isiw.errors import InvalidValueError, LogError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.log.headers import Header

@@ -23,11 +23,10 @@ from isiw.session.console import OperatorConsole, Table
 from isiw.session.earlier import Earlier
 from isiw.session.intensities import require_intensities
 from isiw.session.judging import Judging
-from isiw.session.pausing import Pause
+from isiw.session.pausing import Pause, ended, paused
 from isiw.session.sink import Follower, SessionResult, Wait
 from isiw.session.state import Fault, State, state_of
 from isiw.session.stated import require_limits, require_protocol, require_signals
-from isiw.session.steps import ended, paused
 from isiw.session.terminal import goes_on, is_attended, is_terminal
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable

@@ -15,7 +15,7 @@ from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.info import Readiness
 from isiw.errors import ClockWarning, InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.findings import IN_DOUBT, REMEDIES, Finding, Kind, Severity
+from isiw.findings import REMEDIES, Finding, Kind, Severity
 from isiw.log.headers import Header
 from isiw.log.moments import Ages
 from isiw.log.new_verdicts import isi_confirmed, isi_doubted, newly_doubted
@@ -25,10 +25,18 @@ from isiw.session.earlier import Earlier
 from isiw.session.examination import Examination, examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
-from isiw.signals.amplitudes import Doubts, counted_of, odd_amplitudes
-from isiw.signals.plausible import isi_far, require_plausible, require_plausible_range, unconfirmed
+from isiw.signals.plausible import (
+    Doubts,
+    counted_of,
+    isi_far,
+    odd_amplitudes,
+    require_plausible,
+    require_plausible_range,
+    unconfirmed,
+)
 from isiw.strategy.outcomes import Outcome
 from isiw.strategy.strategy import Strategy
+from isiw.summary import IN_DOUBT
 from isiw.trials import Status, Stimulus, Trial, TrialTable, require_pulse
 
 RecordedT = TypeVar("RecordedT")

@@ -40,8 +40,9 @@ from isiw.session.replay import require_as_real, require_same_person, taken_up
 from isiw.session.stated import require_limits, require_protocol, require_visit
 from isiw.session.threshold import ThresholdRecorder, resume_threshold
 from isiw.signals.limits import SignalLimits
+from isiw.strategy.outcomes import require_trials
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Trial, require_trials
+from isiw.trials import Trial
 from isiw.visit import Visit, VisitProtocol
 
 

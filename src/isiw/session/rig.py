@@ -7,12 +7,13 @@ import math
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import IO, Annotated, Never
+from typing import IO, Annotated, Final, Never
 
 from isiw.checks import Checked, NonNegative, choice, function, whole
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
@@ -24,10 +25,12 @@ from isiw.devices.protocol import Answer, Device
 from isiw.errors import DeviceError, StillArmedError, error_text, os_errors
 from isiw.files import shared_file
 from isiw.log.durable import claim
-from isiw.log.schema import waveform_topic
+from isiw.log.schema import Event, waveform_topic
+from isiw.log.writer import LogWriter
 from isiw.models.protocol import profile_of
-from isiw.session.interrupts import INTERRUPTED, STILL_ARMED, Interrupts, end_process
+from isiw.session.pausing import Interrupts
 from isiw.session.sink import Sink
+from isiw.session.terminal import alarm, restore
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.strategy.strategy import Strategy
 from isiw.types import Reference
@@ -108,6 +111,41 @@ class Safeguards(Checked):
     def backoffs_s(self) -> tuple[float, ...]:
         """Waiting times before each retry [s]."""
         return tuple(self.backoff_s * 2**retry for retry in range(self.retries))
+
+
+STILL_ARMED: Final = 4
+"""The exit code where a device could not be disarmed."""
+
+INTERRUPTED: Final = 130
+"""The exit code where a session did not react to Ctrl-C: what shells report for it."""
+
+_PATIENCE_S, _GLANCE_S = 2.0, 0.01
+
+
+def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
+    """End the process at once, whatever its threads are busy with."""
+    ends = f"{reason} The process ends."
+    end_s = time.monotonic() + _PATIENCE_S
+
+    def show() -> None:
+        restore()
+        alarm(f"\n{ends}" if log is None else f"\n{ends}\nThe log is safe; resume with {log.path}.")
+
+    def write() -> None:
+        if log is not None:
+            log.append(Event(kind="fault", text=ends))
+            log.sync()
+
+    # Each in a thread of its own: a terminal or a disk that holds one up, or is gone, holds up nothing else.
+    steps = [threading.Thread(target=step, daemon=True) for step in (show, write)]
+    try:
+        for step in steps:
+            step.start()
+        while any(step.is_alive() for step in steps) and time.monotonic() < end_s:
+            with suppress(KeyboardInterrupt):  # Ctrl-C pressed again; the process is ending already
+                time.sleep(_GLANCE_S)
+    finally:
+        os._exit(code)
 
 
 class Rig:

@@ -1,4 +1,8 @@
-"""The steps of a session, from asking to concluding a trial, and its pauses, which disarm until somebody answers."""
+"""The steps of a session, from asking to concluding a trial.
+
+The first stimulus's own response is learnt on the way: earlier amplitudes are corrected by it, and a tap alone or a
+longer ISI comes next where it may explain a window.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +10,27 @@ import dataclasses
 import itertools
 import statistics
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Final
 
 from isiw import schedule
-from isiw.decision import StopDecision, StopKind
+from isiw.decision import OF_THE_WINDOW, StopDecision, StopKind
 from isiw.devices.protocol import Answer
-from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, LimitExceededError, NotDelivered, error_text
+from isiw.errors import DeviceTimeoutError, IsiwError, LimitExceededError, NotDelivered, error_text
 from isiw.findings import Finding
 from isiw.log.headers import Header
-from isiw.log.schema import Event, Intent, Waveform
+from isiw.log.new_verdicts import correction
+from isiw.log.schema import Correction, Event, Intent, Waveform
 from isiw.pairing.agenda import Agenda
 from isiw.session.blocks import AHEAD_S, Blocks
 from isiw.session.examination import WindowExamination
 from isiw.session.intensities import set_for
-from isiw.session.own_response import LONGER, OwnResponse
-from isiw.session.pausing import Pausing
+from isiw.session.pausing import Pausing, paused
 from isiw.session.rig import Rig
 from isiw.session.sink import SessionUpdate, Sink
 from isiw.session.state import Fault
-from isiw.signals.judgement import judge, judge_measurement
+from isiw.signals.judgement import judged
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
 from isiw.strategy.decisions import stimuli_left
@@ -35,29 +40,75 @@ from isiw.text.sanitize import shown
 from isiw.trials import Stimulus, Trial
 from isiw.visit import Control
 
-_LAST: Final = 20
-
+_LAST: Final = 20  # stimuli whose times say the usual pace
 _FORESEEN: Final = 500  # pairs that are looked ahead to; how long more of them take follows from these
 _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 
 _NOTHING_GIVEN = (NotDelivered, LimitExceededError)
 """Errors that a device raises only before it delivers."""
 
+PAIRS_FIRST: Final = 4
+"""So many trials show whether a rig works, before taps alone are given."""
 
-def paused(reason: str) -> StopDecision:
-    """The decision that does not stop, of a session that waits for a person."""
-    return StopKind.PAUSED.go_on(f"The session is paused: {reason}")
+KNOWN: Final = "What the first stimulus alone does to the EMG is known now, and was subtracted."
+LONGER: Final = "A longer ISI shows the first stimulus's own response, which may explain the enhancement so far."
 
-
-def ended(reason: str) -> StopDecision:
-    """The decision that does not stop, of a session that a person has ended."""
-    return StopKind.PAUSED.go_on(f"The session was ended before its time: {reason}")
+LEAST_PROBABILITY: Final = 0.9
+"""A window that is as probable as this should not be the first stimulus's own response."""
 
 
 def pace_s(ends_s: Iterable[float]) -> float | None:
     """The usual time from one stimulus to the next [s], whatever rests are among them; None before the second one."""
     gaps_s = [after - before for before, after in itertools.pairwise(ends_s)]
     return statistics.median(gaps_s) if gaps_s else None
+
+
+class OwnResponse:
+    """Learns the response from each sweep, and says what should be given so that more is known of it."""
+
+    def __init__(self, examination: WindowExamination, header: Header, taps: TapResponses) -> None:
+        self._examination, self._taps = examination, taps
+        self._protocol, device, self._high_ms = header.protocol, header.device, header.space.high_ms
+        self._gives_taps = bool(self._protocol.taps_first) and device.tap_alone and "emg" in device.channels
+
+    def after(self, trial: Trial, sweep: Sweep) -> Trial:
+        """Learn from a sweep; its trial with the amplitude without the response, as far as that is known."""
+        self._taps = self._taps.after(trial, sweep)
+        return self._taps.measured(trial)
+
+    def correct(self) -> None:
+        """Correct earlier amplitudes by what is known now."""
+        self._taps, others = self._taps.corrected(self._examination.trials)
+        for trial in others:
+            right = Correction(mep_mv=trial.mep_mv, mep_sd_mv=trial.mep_sd_mv, tap_mv=trial.tap_mv)
+            self._examination.judge(partial(correction, number=trial.index, why=KNOWN, corrected=right))
+
+    @property
+    def wants_tap(self) -> bool:
+        """True if a tap alone should come next."""
+        trials = self._examination.trials
+        if not self._gives_taps or len(trials) < PAIRS_FIRST:
+            return False
+        window = self._examination.learner.strategy.estimate().window
+        return len(trials) < PAIRS_FIRST + self._protocol.taps_first or self._taps.wants_taps(window, trials)
+
+    @property
+    def least_isi_ms(self) -> float | None:
+        """From which ISI on a pair would show the response at trials that a window rests on; None if none is needed."""
+        estimate, trials = self._examination.learner.strategy.estimate(), self._examination.trials
+        if (estimate.probability or 0.0) < LEAST_PROBABILITY:
+            return None
+        least_ms = self._taps.shown_from_ms(estimate.window, trials)
+        return None if least_ms is None or least_ms > self._high_ms else least_ms
+
+    def decided(self, decision: StopDecision) -> StopDecision:
+        """A decision to stop on a window waits until an ISI has shown that it is not the response, or none is left."""
+        if not decision.stop or decision.kind not in OF_THE_WINDOW or self.least_isi_ms is None:
+            return decision
+        strategy = self._examination.learner.strategy
+        if stimuli_left(strategy.stopping, strategy.spent) == 0:
+            return decision
+        return decision.kind.go_on(f"It is too early to stop. {LONGER}")
 
 
 class Steps:
@@ -198,7 +249,7 @@ class Steps:
         """Tell the operator what comes; False if that pauses the session first, or somebody has another wish."""
         if blocks.left_s(number) > AHEAD_S:  # nothing is armed as long as nothing comes
             self._rig.disarm()
-        self._freely(self._wait_until_due, blocks, number, AHEAD_S)
+        self._freely(self._until_due, blocks, number, AHEAD_S)
         if self._disturbed:
             return False
         if (said := blocks.announcement(number)) is not None:
@@ -207,16 +258,8 @@ class Steps:
             return False
         if not self._rig.is_armed:
             self._rig.stage()
-        self._freely(self._wait_until_due, blocks, number, 0.0)
+        self._freely(self._until_due, blocks, number, 0.0)
         return not self._disturbed
-
-    def _wait_until_due(self, blocks: Blocks, number: int, ahead_s: float) -> None:
-        try:
-            while not self._disturbed and (wait_s := blocks.left_s(number, ahead_s)) > 0:
-                self._sink.waiting(wait_s + ahead_s, "Until the next block is due", rests=True)
-                self._rig.clock.sleep_s(min(wait_s, _NAP_S))
-        finally:
-            self._sink.waiting(None)
 
     @property
     def _next_control(self) -> Control | None:
@@ -257,10 +300,18 @@ class Steps:
         else:
             rests = schedule.rests_before(self._header.protocol, number)
             interval_s = schedule.interval_s(self._header.protocol, number, self._header.seed)
+        text = f"Rest after {number} trials" if rests else "Next stimulus"
+        self._sleep(lambda: self._rig.limited.wait_s(interval_s), text, rests=rests)
+
+    def _until_due(self, blocks: Blocks, number: int, ahead_s: float) -> None:
+        """Sleep until so long [s] before a trial's block is due, or an operator has another wish."""
+        self._sleep(lambda: blocks.left_s(number, ahead_s), "Until the next block is due", rests=True, more_s=ahead_s)
+
+    def _sleep(self, left_s: Callable[[], float], text: str, *, rests: bool, more_s: float = 0.0) -> None:
+        """Sleep as long as time is left [s], in naps; who looks on hears what for, and that so much more follows."""
         try:
-            while not self._disturbed and (wait_s := self._rig.limited.wait_s(interval_s)) > 0:
-                text = f"Rest after {number} trials" if rests else "Next stimulus"
-                self._sink.waiting(wait_s, text, rests=rests)
+            while not self._disturbed and (wait_s := left_s()) > 0:
+                self._sink.waiting(wait_s + more_s, text, rests=rests)
                 self._rig.clock.sleep_s(min(wait_s, _NAP_S))
         finally:
             self._sink.waiting(None)
@@ -290,7 +341,7 @@ class Steps:
             trial = self._with_intensity(Trial.unknown(stimulus), stimulus)
             self._at = stimulus.trial, True
             answer = self._answer(stimulus)
-            trial = self._with_intensity(self._judged(stimulus, answer), stimulus)
+            trial = self._with_intensity(judged(answer, stimulus, self._header.space, self._header.signals), stimulus)
             if isinstance(answer, Sweep):
                 trial = self._own_response.after(trial, answer)
             self._watch = self._watch.after(trial, answer)
@@ -338,18 +389,6 @@ class Steps:
         if isinstance(answer, Sweep):
             for name, channel in answer.channels.items():
                 self._sink.append(Waveform.of(stimulus.trial, channel), name)
-
-    def _judged(self, stimulus: Stimulus, answer: Answer) -> Trial:
-        space, signals = self._header.space, self._header.signals
-        if isinstance(answer, Sweep):
-            return judge(answer, stimulus, space, signals)
-        if isinstance(answer, Measurement):
-            return judge_measurement(answer, stimulus, space, signals)
-        raise DeviceError(
-            f"the device's deliver returned {shown(answer)}",
-            expected="an isiw.Sweep or an isiw.Measurement",
-            remedy="Let it return what it recorded, or the MEP that it measured: isiw.Measurement(mep_mv, isi_ms).",
-        )
 
     def _with_intensity(self, trial: Trial, stimulus: Stimulus) -> Trial:
         """A trial with the intensity of its pulse, the plan's or the one to be set; none where it is the usual one."""

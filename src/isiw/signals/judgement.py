@@ -1,5 +1,6 @@
 """The judgement of a trial: from its sweep to an amplitude at a realised ISI, or to the reason why there is none.
 
+A device that measured itself is held to what was commanded, and to its own times.
 What is wrong with every trial, such as an unknown unit, is an error: repeating the trial would not help.
 """
 
@@ -7,14 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from isiw.checks import MOST_MEP_MV, choice
 from isiw.design import DesignSpace
-from isiw.errors import DeviceError, InvalidValueError
-from isiw.findings import MISTRIALS, Kind
-from isiw.signals.agreement import pulse_with_tap_alone, require_agreement, tap_with_tms_alone
+from isiw.errors import DeviceError, InvalidValueError, IsiwError
+from isiw.findings import MISTRIALS, Finding, Kind, Severity, refused
 from isiw.signals.impact import impact_time
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import TAP_SPAN_MS, at_rest, disturbance, known_background_rms, mep_amplitudes
@@ -22,11 +23,29 @@ from isiw.signals.plausible import before_impact, implausible_amplitude
 from isiw.signals.spans import TAP_MS
 from isiw.signals.waveforms import is_blanked, is_recording, is_saturated
 from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.text.sanitize import shown
 from isiw.trials import Status, Stimulus, Trial
 from isiw.types import FloatArray
 
 ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
 """Units of the acceleration; the impact is found in any of them."""
+
+
+def judged(answer: object, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:
+    """Judge what a device has answered, a sweep or its own measurement; arguments and errors are those of both.
+
+    Raises:
+        DeviceError: it is neither.
+    """
+    if isinstance(answer, Sweep):
+        return judge(answer, stimulus, space, limits)
+    if isinstance(answer, Measurement):
+        return judge_measurement(answer, stimulus, space, limits)
+    raise DeviceError(
+        f"the device's deliver returned {shown(answer)}",
+        expected="an isiw.Sweep or an isiw.Measurement",
+        remedy="Let it return what it recorded, or the MEP that it measured: isiw.Measurement(mep_mv, isi_ms).",
+    )
 
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:
@@ -242,3 +261,55 @@ def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Trial) -> float | No
         if rms_mv is not None:
             return float(1000 * rms_mv[0])
     return None
+
+
+CUT_OFF_MS: Final = 2.0
+"""Pulse, event and ISI, each cut off to whole ms, disagree by less; a rig that is wrong about one of them, by more."""
+
+
+def timed_isi_ms(source: Measurement | Trial, space: DesignSpace) -> float | None:
+    """The ISI by the times of the pulse and of the event that it counts from [ms]; None if one is missing."""
+    start_ms = source.t_hit_ms if space.reference == "impact" else source.t_valve_ms
+    return None if start_ms is None or source.t_tms_ms is None else source.t_tms_ms - start_ms
+
+
+def contradicts_its_times(source: Measurement | Trial, space: DesignSpace) -> bool:
+    """Whether the realised ISI is another one than the times say."""
+    timed_ms = timed_isi_ms(source, space)
+    return timed_ms is not None and source.isi_ms is not None and abs(timed_ms - source.isi_ms) >= CUT_OFF_MS
+
+
+def require_agreement(measurement: Measurement, stimulus: Stimulus, space: DesignSpace) -> None:
+    """Refuse a measurement whose times are not those of the trial that was commanded, or of the ISI that it tells."""
+    alone = stimulus.isi_ms is None
+    if alone and not stimulus.tap_alone and measurement.t_hit_ms is not None:
+        raise tap_with_tms_alone(measurement.t_hit_ms)
+    if stimulus.tap_alone and measurement.t_tms_ms is not None:
+        raise pulse_with_tap_alone(measurement.t_tms_ms)
+    if contradicts_its_times(measurement, space):
+        event = "impact" if space.reference == "impact" else "valve command"
+        raise _of_device(
+            Kind.TIMES,
+            "the times that the device reports contradict the ISI that it reports",
+            f"a pulse {timed_isi_ms(measurement, space):g} ms after the {event}, and a realised ISI of "
+            f"{measurement.isi_ms:g} ms",
+            "Report the realised ISI, never the wanted one. Are its times in ms, on one clock, of this trial?",
+            f"the same to within {CUT_OFF_MS:g} ms",
+        )
+
+
+def tap_with_tms_alone(hit_ms: float) -> IsiwError:
+    """That a tap hit at this time with TMS alone: a response to both would be taken for one to the pulse."""
+    text, got = "the device reports a tap where TMS alone was commanded", f"an impact at {hit_ms:g} ms"
+    remedy = "Does the valve stay open? Leave t_hit_ms and t_valve_ms out where nothing hits."
+    return _of_device(Kind.TAP_UNWANTED, text, got, remedy)
+
+
+def pulse_with_tap_alone(pulse_ms: float) -> IsiwError:
+    """That a pulse came at this time with a tap alone."""
+    text = "the device reports a magnetic pulse where a tap alone was commanded"
+    return _of_device(Kind.PULSE_UNWANTED, text, f"one at {pulse_ms:g} ms")
+
+
+def _of_device(kind: Kind, text: str, got: str, remedy: str = "", expected: str | None = None) -> IsiwError:
+    return refused(Finding(kind, Severity.REFUSED, text, remedy), got, expected, DeviceError)

@@ -14,12 +14,11 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.findings import REMEDIES, Finding, Kind, Severity, UnitScale
-from isiw.signals.amplitudes import Counted
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
 from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import MIN_BACKGROUND_MS
-from isiw.signals.plausible import implausible_amplitude
+from isiw.signals.plausible import Counted, implausible_amplitude
 from isiw.signals.waveforms import PULSE_GUARD_MS, is_recording, samples
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import Trial
@@ -238,7 +237,8 @@ def _unit_question(rest_uv: float, evidence: Evidence) -> str | None:
     if emg is None:  # the device itself measures
         return "Is background_rms_uv, as the device reports it, in µV? Convert it"
     levels_uv = {unit: rest_uv * EMG_UNITS_MV[unit] / EMG_UNITS_MV[emg.unit] for unit in ("V", "mV", "µV")}
-    likely = REST_UV.likely_unit(levels_uv)
+    possible = {unit: uv for unit, uv in levels_uv.items() if REST_UV.least <= uv <= REST_UV.most}
+    likely = min(possible, key=lambda unit: abs(math.log(possible[unit] / REST_UV.usual)), default=None)
     return likely and f"Is it in {likely}, and described as {emg.unit}? Give the channel its unit"
 
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 from isiw.acquisition.registry import ACQUISITIONS, OWN
 from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace, require_space
-from isiw.errors import StrategyError, did_you_mean
+from isiw.errors import InvalidValueError, StrategyError, did_you_mean
 from isiw.findings import require_percent
 from isiw.models.particles.profile import ProfilePrior
-from isiw.models.protocol import profile_of
-from isiw.strategy.intensities import NONE, Intensities, intensities_for
+from isiw.models.protocol import pairs_pct_rmt_of, profile_of
+from isiw.strategy.intensities import NONE, Intensities
 from isiw.strategy.recipe import Recipe
 from isiw.strategy.settings.common import (
     Choosing,
@@ -234,3 +234,26 @@ def intensities_of(settings: Settings) -> Intensities:
     if not isinstance(asking, Choosing):
         return NONE
     return intensities_for(settings.model, asking.intensities_pct_rmt, chosen=asking.chooses_intensity)
+
+
+def intensities_for(model: object, named_pct_rmt: Sequence[float], *, chosen: bool) -> Intensities:
+    """The named intensities, for a model that has a law of them.
+
+    Raises:
+        InvalidValueError: an intensity in another unit, or one that is named twice.
+        StrategyError: a model without a law of intensities.
+    """
+    if not named_pct_rmt:
+        return NONE
+    for pct_rmt in named_pct_rmt:
+        require_percent("intensities_pct_rmt", pct_rmt)
+    if len(set(named_pct_rmt)) < len(named_pct_rmt):
+        raise InvalidValueError("an intensity of the pairs is named twice", got=tuple(named_pct_rmt))
+    usual_pct_rmt = pairs_pct_rmt_of(model)
+    if usual_pct_rmt is None:
+        raise StrategyError(
+            "the strategy cannot learn from pairs of several intensities",
+            got=f"{type(model).__name__}, which has no law of other intensities",
+            remedy="Leave out intensities_pct_rmt, or choose the default.",
+        )
+    return Intensities(tuple(map(float, named_pct_rmt)), chosen, usual_pct_rmt)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from isiw.checks import Checked, Flag, can
-from isiw.errors import InvalidValueError, StrategyError
-from isiw.findings import require_percent
-from isiw.models.protocol import ForeseesIntensities, Posterior, pairs_pct_rmt_of
+from isiw.models.protocol import ForeseesIntensities, Posterior
 from isiw.strategy.choice import Choice
 
 
@@ -75,26 +73,3 @@ class Intensities(Checked):
 
 NONE: Final = Intensities()
 """Of pairs that all have the usual intensity."""
-
-
-def intensities_for(model: object, named_pct_rmt: Sequence[float], *, chosen: bool) -> Intensities:
-    """The named intensities, for a model that has a law of them.
-
-    Raises:
-        InvalidValueError: an intensity in another unit, or one that is named twice.
-        StrategyError: a model without a law of intensities.
-    """
-    if not named_pct_rmt:
-        return NONE
-    for pct_rmt in named_pct_rmt:
-        require_percent("intensities_pct_rmt", pct_rmt)
-    if len(set(named_pct_rmt)) < len(named_pct_rmt):
-        raise InvalidValueError("an intensity of the pairs is named twice", got=tuple(named_pct_rmt))
-    usual_pct_rmt = pairs_pct_rmt_of(model)
-    if usual_pct_rmt is None:
-        raise StrategyError(
-            "the strategy cannot learn from pairs of several intensities",
-            got=f"{type(model).__name__}, which has no law of other intensities",
-            remedy="Leave out intensities_pct_rmt, or choose the default.",
-        )
-    return Intensities(tuple(map(float, named_pct_rmt)), chosen, usual_pct_rmt)

@@ -15,11 +15,11 @@ from isiw.change import MOST_NOTED
 from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative, Positive
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
-from isiw.findings import IN_DOUBT, Finding
+from isiw.findings import Finding
 from isiw.models.protocol import Observation
-from isiw.signals.amplitudes import Counted, Doubts, odd_amplitudes
-from isiw.signals.plausible import doubtful_from, is_far, isi_far, unconfirmed
+from isiw.signals.plausible import Counted, Doubts, doubtful_from, is_far, isi_far, odd_amplitudes, unconfirmed
 from isiw.signals.taps_alone import TapsAlone, is_inside, meets_response, taps_anywhere, taps_near
+from isiw.summary import IN_DOUBT
 from isiw.trials import Trial
 from isiw.types import Reference
 from isiw.window import Window
@@ -272,3 +272,16 @@ class Reported:
         told = [Counted(one.mep_mv, one.isi_ms) for one in of_pairs if one.mep_mv is not None]
         odd = (IN_DOUBT if reported.doubted else found, *odd_amplitudes(told, detection_limit_mv))
         return replace(reported, doubts=self.doubts.after(odd))
+
+
+def require_trials(trials: object) -> tuple[Trial, ...]:
+    """Earlier trials, each of which must be a `Trial`."""
+    given = tuple(trials) if isinstance(trials, Iterable) else (trials,)
+    for trial in given:
+        if not isinstance(trial, Trial):
+            raise InvalidValueError(
+                "earlier trials must be of the type isiw.Trial",
+                got=trial,
+                remedy="Of a log they are isiw.read_session(log).table; its .trials is a table of pandas.",
+            )
+    return given

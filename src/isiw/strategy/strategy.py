@@ -14,13 +14,12 @@ from isiw.estimate import WindowEstimate
 from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel, pairs_pct_rmt_of
 from isiw.signals.plausible import require_plausible, require_plausible_range
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
-from isiw.strategy.course import Method
+from isiw.strategy.course import Known, Method
 from isiw.strategy.decisions import StoppingRule, stimuli_left
 from isiw.strategy.intensities import NONE, Intensities
-from isiw.strategy.known import Known
-from isiw.strategy.outcomes import Outcome, Outcomes, Reported
+from isiw.strategy.outcomes import Outcome, Outcomes, Reported, require_trials
 from isiw.strategy.recipe import Recipe
-from isiw.trials import Trial, require_pulse, require_trials
+from isiw.trials import Trial, require_pulse
 from isiw.types import FloatArray
 
 MOST_OF_A_BATCH = 1000

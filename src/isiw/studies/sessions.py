@@ -25,9 +25,8 @@ from isiw.models.protocol import Observation, Posterior, ReportsTrouble
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choice import Choice, instead_of_lost
-from isiw.strategy.course import Course, Method
+from isiw.strategy.course import Course, Known, Method
 from isiw.strategy.decisions import stimuli_left
-from isiw.strategy.known import Known
 from isiw.strategy.outcomes import Outcome, Outcomes
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy

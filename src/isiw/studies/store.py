@@ -28,7 +28,7 @@ from isiw.errors import StudyError, os_errors
 from isiw.files import TEMPORARY, put
 from isiw.lazy import pa, parquet, pd
 from isiw.log.durable import claim
-from isiw.native import library
+from isiw.native import engine
 from isiw.opening import opened
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, begun_study, study_values
@@ -39,7 +39,7 @@ from isiw.text.toml_files import read_toml
 @cache
 def code_checksum() -> str:
     """The CRC-32 of isiw's modules, whatever their line endings, and of the sources of its compiled engine."""
-    root, checksum = Path(isiw.__file__).parent, zlib.crc32(library.sources().encode())
+    root, checksum = Path(isiw.__file__).parent, zlib.crc32(engine.sources().encode())
     for path in sorted(root.rglob("*.py")):
         checksum = zlib.crc32(path.relative_to(root).as_posix().encode(), checksum)
         checksum = zlib.crc32(path.read_bytes().replace(b"\r\n", b"\n"), checksum)

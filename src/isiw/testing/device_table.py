@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from isiw.devices.info import DeviceInfo, unprotected
-from isiw.devices.protocol import Answer, Device, HasMemory
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import Answer, Device, HasMemory, unprotected
 from isiw.findings import Kind
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
 from isiw.signals.rig import EVOKED_SPAN_MS, steepest_edge, tap_span_ms

@@ -23,7 +23,7 @@ from isiw.log.schema import waveform_topic
 from isiw.session.rig import Rig, Safeguards, exclusive, own_reference
 from isiw.session.sink import Sink
 from isiw.signals import SignalLimits, judge, judge_measurement
-from isiw.signals.amplitudes import Counted
+from isiw.signals.plausible import Counted
 from isiw.signals.rig import Evidence, too_early_by_chance
 from isiw.signals.watch import findings
 from isiw.sweeps import Measurement, Sweep

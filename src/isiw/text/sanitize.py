@@ -56,15 +56,7 @@ def _plain(character: str) -> str:
     return "" if category in _OBEYED else "\n" if category in ("Zl", "Zp") else character
 
 
-_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _WHOLE: Final = re.compile(r"[0-9]{1,18}")
-
-
-def read_number(text: str) -> float:
-    """The number that a text is, in ASCII digits with a decimal point; Python itself would take 1_0_0 and ١٢, too."""
-    if not _NUMBER.fullmatch(text):
-        raise ValueError("no number with a decimal point")
-    return float(text)
 
 
 def read_whole(text: str) -> int | None:

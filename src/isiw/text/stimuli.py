@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
@@ -73,18 +73,6 @@ STIMULI: Final[Mapping[Conditioning, StimulusWords]] = MappingProxyType(
 """The words for each conditioning stimulus."""
 
 TAP: Final = STIMULI["tap"]
-
-
-def words_of(stimuli: Iterable[Conditioning]) -> StimulusWords:
-    """The words for all stimuli of some sessions; of none of them, those for the tap."""
-    given = set(stimuli)
-    several = [words for stimulus, words in STIMULI.items() if stimulus in given] or [TAP]
-    joined = {
-        field.name: " or ".join(dict.fromkeys(getattr(words, field.name) for words in several))
-        for field in fields(StimulusWords)
-        if field.name != "by_valve"
-    }
-    return StimulusWords(**joined, by_valve=any(words.by_valve for words in several))
 
 
 def meanings(columns: Mapping[str, tuple[str, str]], first: StimulusWords, **more: str) -> dict[str, tuple[str, str]]:

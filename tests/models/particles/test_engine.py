@@ -12,6 +12,7 @@ import scipy.special
 
 from isiw.design import VALVE_SPACE
 from isiw.models.particles import ParticleModel
+from isiw.models.particles.compiled import Crowd
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.records import (
@@ -30,9 +31,7 @@ from isiw.models.particles.records import (
 from isiw.models.protocol import Observation
 from isiw.models.shared.draws import systematic
 from isiw.models.shared.history import Circumstances, History, neutral
-from isiw.native.engine import elementary, log_likelihoods
-from isiw.native.law import Crowd
-from isiw.native.library import UNKNOWN
+from isiw.native.engine import UNKNOWN, elementary, log_likelihoods
 from isiw.types import FloatArray, Singles
 from native import reference
 from native.drawn import CASES, Case, columns, history, seeds, trials

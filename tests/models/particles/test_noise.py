@@ -14,7 +14,7 @@ from isiw.models.particles.records import FORM, LOG_RATIO, NOISE, PRESENT, SHAPE
 from isiw.models.shared.draws import LEVELS
 from isiw.models.shared.history import neutral
 from isiw.native import engine
-from isiw.native.library import FIELDS
+from isiw.native.engine import FIELDS
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.types import Array, ArrayLike, FloatArray, Singles
 from native import reference

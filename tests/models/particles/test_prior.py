@@ -13,6 +13,7 @@ from scipy.stats import kstest
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.particles.changes import ChangeKind, ChangePrior
+from isiw.models.particles.compiled import Crowd
 from isiw.models.particles.jumps import law_of
 from isiw.models.particles.latents import BLOCKS, LATENTS, Latents, latents_of, used_by
 from isiw.models.particles.laws import (
@@ -35,7 +36,6 @@ from isiw.models.particles.supra.prior import LATENTS as SUPRA_LATENTS
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.scales import Scale
 from isiw.models.shared.start import StartPrior
-from isiw.native.law import Crowd
 from isiw.priors.population import beside
 from isiw.types import Conditioning, FloatArray
 from native.drawn import Case

@@ -5,7 +5,7 @@ import pytest
 
 from isiw.models.particles.records import FORM, PRESENT, SHAPE, START, WIDTH
 from isiw.native import engine
-from isiw.native.library import FIELDS
+from isiw.native.engine import FIELDS
 from isiw.subjects.responses import PeakProfile, TwoPeakProfile
 from isiw.types import Singles
 

@@ -7,6 +7,8 @@ delivered or disarmed without an answer that says so.
 from __future__ import annotations
 
 import dataclasses
+import inspect
+import re
 import secrets
 import threading
 import time
@@ -16,12 +18,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final, Protocol, TypeVar, Unpack
 
-from isiw.checks import Bounds, from_table, number
+from isiw.checks import Bounds, number
 from isiw.devices.info import DeviceInfo
 from isiw.devices.protocol import require_staged
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.sweeps import Channel, Sweep
-from isiw.text.sanitize import plain, read_number
+from isiw.text.sanitize import plain
 from isiw.trials import Stimulus
 
 _T = TypeVar("_T")
@@ -291,3 +293,28 @@ def sweep_of(channels: Mapping[str, Channel], t_tms_ms: float, reply: Reply) -> 
 def described(info: DeviceInfo | Mapping[str, Any], **known: Any) -> DeviceInfo:
     """A device's description, from a table of a configuration or from the object."""
     return dataclasses.replace(from_table(DeviceInfo, info, "info"), **known)
+
+
+def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:
+    """An instance of a dataclass."""
+    if isinstance(table, kind):
+        return table
+    if not isinstance(table, Mapping):
+        raise InvalidValueError(f"{what} must be a table", got=table)
+    parameters = inspect.signature(kind)
+    try:
+        given = parameters.bind(**table)
+    except TypeError as error:
+        remedy = f"Its keys are {', '.join(parameters.parameters)}."
+        raise InvalidValueError(f"the table {what}: {error}", got=dict(table), remedy=remedy) from error
+    return kind(*given.args, **given.kwargs)
+
+
+_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+
+
+def read_number(text: str) -> float:
+    """The number that a text is, in ASCII digits with a decimal point; Python itself would take 1_0_0 and ١٢, too."""
+    if not _NUMBER.fullmatch(text):
+        raise ValueError("no number with a decimal point")
+    return float(text)

@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from isiw.checks import from_table, text
+from isiw.checks import text
 from isiw.devices.info import DeviceInfo, Readiness
 from isiw.devices.protocol import Answer, require_staged
-from isiw.devices.transports.exchange import described
+from isiw.devices.transports.exchange import described, from_table
 from isiw.devices.transports.line_exchange import Line, LineSettings
 from isiw.devices.transports.line_table import (
     LineCommands,

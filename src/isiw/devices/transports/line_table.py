@@ -18,11 +18,11 @@ from string import Formatter
 from typing import Annotated, Final, TypeAlias
 from urllib.parse import urlsplit
 
-from isiw.checks import Checked, Positive, Text, from_table, number
+from isiw.checks import Checked, Positive, Text, number
+from isiw.devices.transports.exchange import from_table, read_number
 from isiw.devices.watchdog import SUPPORTED
 from isiw.errors import InvalidValueError
 from isiw.text.named_code import library
-from isiw.text.sanitize import read_number
 
 _TCP = "socket://"
 _MOST_BYTES = 4096

@@ -13,9 +13,18 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any, Final
 
-from isiw.checks import from_table, number, text
+from isiw.checks import number, text
 from isiw.devices.info import DeviceInfo
-from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described, sweep_of
+from isiw.devices.transports.exchange import (
+    LONGEST_REPLY,
+    Exchange,
+    Reply,
+    Request,
+    Verb,
+    described,
+    from_table,
+    sweep_of,
+)
 from isiw.devices.transports.lsl_samples import LATE_S, LslChannel, SampleStream
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.sweeps import Channel, Sweep

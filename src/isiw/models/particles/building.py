@@ -9,10 +9,10 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.models.particles.compiled import Tables
 from isiw.models.particles.mixture import Mixture
 from isiw.models.shared.start import StartPrior
-from isiw.native.law import Tables
-from isiw.native.library import MEANINGS
+from isiw.native.engine import MEANINGS
 from isiw.types import FloatArray, Singles
 
 PART_PROBABILITY: Final = (0.25, 0.30, 0.25, 0.20)

@@ -14,6 +14,7 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.models.particles.building import prior_tables
 from isiw.models.particles.changes import ChangeKind
+from isiw.models.particles.compiled import Law
 from isiw.models.particles.latents import (
     KINDS,
     LATENTS,
@@ -25,7 +26,6 @@ from isiw.models.particles.latents import (
 )
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Prior
-from isiw.native.law import Law
 
 JUMPS: Final = {
     "form": 0.09,

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Any, Final, TypeVar
 
-from isiw.checks import Checked, Positive, Share, require_sum_of_one
-from isiw.models.shared.scales import AnyLaw, PositiveLaw, Scale
+from isiw.checks import Checked, Positive, Share
+from isiw.models.shared.scales import AnyLaw, PositiveLaw, Scale, require_sum_of_one
 
 L = TypeVar("L", bound=Any)
 """A law with a share."""

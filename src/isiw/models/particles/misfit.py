@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
+from isiw.models.particles.compiled import Crowd, Law
 from isiw.models.particles.mixture import log_sum
 from isiw.models.shared.history import BY_CURVES, COUNTS, SHIFT, History
 from isiw.native.engine import log_likelihoods
-from isiw.native.law import Crowd, Law
 from isiw.types import BoolArray, FloatArray, Singles
 
 STAKED: Final = np.array([0.25, 0.8])

@@ -14,6 +14,7 @@ from isiw.checks import MOST_OF_A_KIND, Checked, NonNegative, Positive, Share, w
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import Later
+from isiw.models.particles.compiled import Crowd, Law
 from isiw.models.particles.jumps import law_of
 from isiw.models.particles.latents import Latents, latents_of
 from isiw.models.particles.misfit import against_level
@@ -26,7 +27,6 @@ from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import AtIntensity, Observation, PriorPerson
 from isiw.models.shared.draws import NOTED, SIMULATED, seeds, stream
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, grid_of, profile_grid, sampled_estimate
-from isiw.native.law import Crowd, Law
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
 

@@ -11,11 +11,11 @@ from typing import Generic, Protocol, Self, TypeVar
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.models.particles.compiled import Law
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import History, observed
 from isiw.native.engine import Foreseen
-from isiw.native.law import Law
 from isiw.types import Array, FloatArray, Singles
 
 

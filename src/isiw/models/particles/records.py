@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from isiw.native.library import FIELDS
+from isiw.native.engine import FIELDS
 
 NOISE, SHAPE, PRESENT, START, WIDTH, FORM, LOG_FLOOR, FLOOR_SD, LOG_RATIO, SPREAD, OUTPUT_SD = range(11)
 BOOST, REST, ONSET, MOST, LEAST, DRIFT, STARTLED, SLOPE, LOW_START, LOW_WIDTH, DEPTH = range(11, 22)

@@ -14,15 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from isiw.checks import Checked, Natural, Share
+from isiw.models.particles.compiled import Crowd, Law
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.misfit import Bets, probability_below
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
 from isiw.models.shared.draws import seeds
 from isiw.models.shared.history import BY_CURVES, COUNTS, SHIFT, History
-from isiw.native.engine import log_likelihoods
-from isiw.native.law import Crowd, Law
-from isiw.native.library import Seeds
+from isiw.native.engine import Seeds, log_likelihoods
 from isiw.types import BoolArray, FloatArray, Singles
 
 LEAST_ESS = 0.01

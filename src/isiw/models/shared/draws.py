@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from isiw.native.library import Seeds
+from isiw.native.engine import Seeds
 from isiw.types import Array, FloatArray, IntArray
 
 LEVELS: Final = 24

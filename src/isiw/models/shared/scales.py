@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from functools import partial
 from typing import Annotated, Any, Final, NamedTuple, TypeAlias, TypeVar
 
@@ -71,3 +72,9 @@ def _is_scale(value: tuple[object, ...], *, positive: bool) -> bool:
     if positive:
         return 1 / _MOST_MEDIAN <= median <= _MOST_MEDIAN and 0 < sd <= _MOST_LOG_SD and 0 <= tail <= _MOST_LOG_SD
     return abs(median) <= _MOST_MEDIAN and 0 < sd <= _MOST_MEDIAN and 0 <= tail <= _MOST_MEDIAN
+
+
+def require_sum_of_one(what: str, shares: Iterable[float]) -> None:
+    """Raise if probabilities that exclude each other do not sum to 1."""
+    if not math.isclose(total := math.fsum(shares), 1.0, abs_tol=1e-6):
+        raise InvalidValueError(f"{what} must sum to 1", got=total)

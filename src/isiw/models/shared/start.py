@@ -9,17 +9,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.checks import (
-    Checked,
-    MeanAndSd,
-    Number,
-    Positive,
-    Share,
-    ascending,
-    require_sum_of_one,
-)
+from isiw.checks import Checked, MeanAndSd, Number, Positive, Share, ascending
 from isiw.design import DesignSpace
 from isiw.models.shared.draws import normal_below
+from isiw.models.shared.scales import require_sum_of_one
 from isiw.types import Array, FloatArray
 
 BEFORE_MS: Final = 100.0

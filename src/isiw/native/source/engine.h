@@ -8,7 +8,7 @@ in between. Single precision; indices are 64 bits. Arrays lie in C order: (b, p,
 
 #include <stdint.h>
 
-/* What is known of a model's prior and of its moves; see `isiw.native.law.Tables`. */
+/* What is known of a model's prior and of its moves; see `isiw.models.particles.compiled.Tables`. */
 typedef struct {
     int64_t latents, blocks, width, knots, place_count, states, part_count, jump_count, kind_values;
     const int64_t *at;         /* of the latent of each meaning; `latents` where the model has none, (MEANINGS,) */

@@ -9,9 +9,9 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.models.particles.building import prior_tables
+from isiw.models.particles.compiled import Law
 from isiw.models.particles.latents import LATENTS as DEFAULT_LATENTS
 from isiw.models.particles.supra.prior import BLOCKS, LATENTS, SupraPrior
-from isiw.native.law import Law
 from isiw.types import BoolArray
 
 JUMPS: Final = {

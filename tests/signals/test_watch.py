@@ -12,10 +12,9 @@ from isiw.design import DesignSpace
 from isiw.devices.simulated import RecordedPerson, Simulation, load_recordings
 from isiw.findings import Finding, Kind
 from isiw.signals import SignalLimits, judge
-from isiw.signals.amplitudes import Counted
-from isiw.signals.places import shown_by
+from isiw.signals.plausible import Counted
 from isiw.signals.rig import Evidence
-from isiw.signals.watch import findings
+from isiw.signals.watch import findings, shown_by
 from isiw.subjects.cohorts import cohort
 from isiw.sweeps import Channel, Sweep
 from isiw.trials import Stimulus

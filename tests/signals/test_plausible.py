@@ -6,8 +6,7 @@ import pytest
 from found import doubt_of
 from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.findings import Finding, Kind, Severity
-from isiw.signals.amplitudes import Doubts
-from isiw.signals.plausible import isi_far, require_plausible
+from isiw.signals.plausible import Doubts, isi_far, require_plausible
 
 
 @pytest.mark.parametrize(("isi_ms", "mep_mv"), [(30.0, 0.02), (300.0, 0.02), (11.0, 1.5)])

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.native.library import (
+from isiw.native.engine import (
     COLUMNS,
     DOUBLE,
     FIELDS,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from isiw.models.particles import jumps
+from isiw.models.particles.compiled import Law, Tables
 from isiw.native.engine import expected_f1
-from isiw.native.law import Law, Tables
 from native.drawn import CASES
 
 
