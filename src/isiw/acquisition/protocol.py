@@ -9,14 +9,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
-from isiw.models.protocol import (
-    Conditions,
-    Posterior,
-    PredictsOutcomes,
-    ProposesIsi,
-    SamplesProfiles,
-    SamplesWindows,
-)
+from isiw.models.protocol import Conditions, Posterior, PredictsOutcomes, ProposesIsi, SamplesProfiles, SamplesWindows
 from isiw.types import Array, IntArray
 
 _GOLDEN = (5**0.5 - 1) / 2

@@ -22,14 +22,7 @@ from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_
 from isiw.errors import InvalidValueError
 from isiw.lazy import pd, scipy
 from isiw.log.record import SessionRecord
-from isiw.signals.events import (
-    EMG_DELAY_MS,
-    TapEvents,
-    detect_events,
-    first_rise,
-    impact_times_in_emg,
-    sweep_events,
-)
+from isiw.signals.events import EMG_DELAY_MS, TapEvents, detect_events, first_rise, impact_times_in_emg, sweep_events
 from isiw.signals.impact import VALVE_MS
 from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, rest_level
 from isiw.sweeps import Sweep

@@ -15,10 +15,7 @@ from isiw.trials import Trial
 
 
 def sweeps_figure(
-    trials: Iterable[Trial],
-    sweeps: Mapping[int, Mapping[str, Channel]],
-    mep_window_ms: tuple[float, float],
-    most: int,
+    trials: Iterable[Trial], sweeps: Mapping[int, Mapping[str, Channel]], mep_window_ms: tuple[float, float], most: int
 ) -> Figure | None:
     """Draw the EMG of the first trials that have any, about the pulse.
 

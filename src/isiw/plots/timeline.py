@@ -15,19 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from isiw.figures import Estimate
 from isiw.log.record import SessionRecord
-from isiw.plots.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    ORANGE,
-    RED,
-    TRIAL_AXIS,
-    edge_intervals,
-    explain,
-    saying,
-    tidied,
-)
+from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, TRIAL_AXIS, edge_intervals, explain, saying, tidied
 from isiw.signals.impact import VALVE_MS
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.sweeps import Channel

@@ -121,11 +121,7 @@ def _whose(record: SessionRecord) -> str:
 
 
 def save_comparison(
-    records: Sequence[SessionRecord],
-    differences: Sequence[Difference],
-    path: str | Path,
-    *,
-    overwrite: bool = False,
+    records: Sequence[SessionRecord], differences: Sequence[Difference], path: str | Path, *, overwrite: bool = False
 ) -> Path:
     """Write a page that compares sessions into a file.
 

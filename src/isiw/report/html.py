@@ -40,10 +40,7 @@ def rendered(template: str, scripts: Sequence[str] = (), **contents: Any) -> str
     digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     hashes = [f"'sha256-{digest}'" for digest in digests]  # what the page's policy knows a script by
     page: str = environment.get_template(template).render(
-        contents,
-        style=asset("page.css"),
-        scripts=scripts,
-        hashes=" ".join(hashes) or "'none'",
+        contents, style=asset("page.css"), scripts=scripts, hashes=" ".join(hashes) or "'none'"
     )
     return page
 

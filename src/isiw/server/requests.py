@@ -74,8 +74,7 @@ class CreateRequest(_Request):
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of the strategy.")
     visit: PersonsVisit = PersonsVisit()
     space: Space = Field(
-        default=VALVE_SPACE,
-        description="Without it, ISIs count from the valve command, from 0 to 500 ms.",
+        default=VALVE_SPACE, description="Without it, ISIs count from the valve command, from 0 to 500 ms."
     )
     strategy: StrategyConfig = StrategyConfig()
     limits: PulseLimits = PulseLimits()
@@ -166,16 +165,13 @@ class MistrialRequest(_Request):
     client: str | None = _CLIENT
 
 
-_KEY: Final = r"^[A-Za-z0-9_-]{1,64}$"
-
-
 class NoteRequest(_Request):
     """A remark for the log, or what changed."""
 
     text: Text
     key: str | None = Field(
         default=None,
-        pattern=_KEY,
+        pattern=KEY,
         description="Of the client's choice: the same note or change is logged once only, another is refused.",
     )
 
@@ -186,7 +182,7 @@ class IncludeRequest(_Request):
     trial: TrialNumber
     key: str | None = Field(
         default=None,
-        pattern=_KEY,
+        pattern=KEY,
         description="Of the client's choice: said again with it, it changes nothing, whatever was said since.",
     )
 

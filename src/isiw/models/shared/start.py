@@ -9,15 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.checks import (
-    Checked,
-    MeanAndSd,
-    Number,
-    Positive,
-    Share,
-    ascending,
-    require_sum_of_one,
-)
+from isiw.checks import Checked, MeanAndSd, Number, Positive, Share, ascending, require_sum_of_one
 from isiw.design import DesignSpace
 from isiw.models.shared.draws import normal_below
 from isiw.types import Array, FloatArray
