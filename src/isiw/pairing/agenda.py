@@ -30,10 +30,7 @@ OUTSIDE: Final = 0.1
 class Agenda:
     """The agenda of one intervention. What comes next depends on plan, seed, and the trials before it alone.
 
-    Args:
-        intervention: the plan and the sealed arm.
-        strategy: knows the window, from the trials before the intervention.
-        seed: the session's, which draws intervals and the places of probes.
+    The strategy knows the window from the trials before; the session's seed draws intervals and the places of probes.
 
     Raises:
         InvalidValueError: no window was found, or the plan's range holds none of its ISIs.
@@ -103,11 +100,7 @@ class Agenda:
         return slot is not None and schedule.rests_before_slot(slot)
 
     def isi_ms(self, trials: Iterable[Trial]) -> float:
-        """The ISI of the next pair [ms]; the same for the same trials.
-
-        Args:
-            trials: all before it, as they count now.
-        """
+        """The ISI of the next pair [ms], after all trials before it as they count now; the same for the same trials."""
         trials = tuple(trials)
         slot = self._slots[len(trials)]
         if self.plan.probes or self.plan.follow_ms:
@@ -119,11 +112,7 @@ class Agenda:
         return self._space.snap(_turn(self._used_ms(), slot.place))
 
     def followed(self, trials: Iterable[Trial]) -> Followed:
-        """What is known of the window after some trials.
-
-        Args:
-            trials: all so far, as they count now.
-        """
+        """What is known of the window after all trials so far, as they count now."""
         self._learn(tuple(trials))
         return self._followed
 

@@ -30,13 +30,7 @@ class FollowedPair(NamedTuple):
 
 
 def course_of(agenda: Agenda, trials: Iterable[Trial], seed: int) -> tuple[FollowedPair, ...]:
-    """What was known at each pair that was delivered.
-
-    Args:
-        agenda: the agenda of the intervention.
-        trials: all of its trials so far, as they count now.
-        seed: the session's.
-    """
+    """What was known at each pair that was delivered, from all trials of the intervention so far."""
     before: list[Trial] = []
     pairs = []
     for trial in trials:

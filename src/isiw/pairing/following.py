@@ -113,13 +113,7 @@ class Followed:
     def begin(
         cls, posterior: Posterior, space: DesignSpace, earlier: Sequence[Trial], movement: Movement | None = None
     ) -> Followed:
-        """What is known before the first pair.
-
-        Args:
-            posterior: the posterior of the search for the window.
-            space: its ISIs.
-            earlier: its trials, which say how much MEPs vary.
-            movement: what changes from pair to pair.
+        """What is known before the first pair, from a search's posterior, and its trials for how much MEPs vary.
 
         Raises:
             StrategyError: a posterior that samples neither profiles nor windows.
@@ -234,10 +228,8 @@ class Followed:
 
 
 def _interval(values: FloatArray, weights: FloatArray, level: float) -> tuple[float, float, float]:
-    order = np.argsort(values)
-    summed = np.cumsum(weights[order])
-    picks = [int(np.searchsorted(summed, share)) for share in (0.5, (1 - level) / 2, (1 + level) / 2)]
-    median, low, high = (float(values[order][min(pick, len(values) - 1)]) for pick in picks)
+    shares = (0.5, (1 - level) / 2, (1 + level) / 2)
+    median, low, high = np.quantile(values, shares, weights=weights, method="inverted_cdf").tolist()
     return median, low, high
 
 

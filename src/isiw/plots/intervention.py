@@ -22,12 +22,7 @@ _LEAST_UV: Final = 1.0
 
 
 def change_figure(effect: AfterEffect, pulses: Sequence[TestPulse]) -> Figure:
-    """TMS alone before and after: each pulse, the mean of each block, and where it would be without an effect.
-
-    Args:
-        effect: what `isiw.pairing.change_of` says of the pulses.
-        pulses: of TMS alone, in the order of delivery.
-    """
+    """TMS alone before and after: each pulse, the mean of each block, and where it would be without an effect."""
     blocks = _by_block(effect, pulses)
     figure = Figure(figsize=(8.4, 4.4), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.0 + 0.35 * len(blocks), 1.8))
@@ -105,9 +100,7 @@ def _draw_changes(axes: Axes, effect: AfterEffect) -> None:
 def dose_figure(delivered: Sequence[Delivered], window: Sequence[tuple[float, float, float]] = ()) -> Figure:
     """The pairs of an intervention: at which ISIs, and when; and where the window was.
 
-    Args:
-        delivered: in the order of delivery.
-        window: at some times [s from the first pair] where the window starts and ends [ms].
+    The window is where it starts and ends [ms] at some times [s from the first pair].
     """
     figure = Figure(figsize=(8.4, 2.9), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.7), sharey=True)
@@ -138,11 +131,7 @@ def dose_figure(delivered: Sequence[Delivered], window: Sequence[tuple[float, fl
 
 
 def course_figure(course: Sequence[FollowedPair]) -> Figure:
-    """The window that was followed: the best ISI with its interval, each pair, and how many of a block were inside.
-
-    Args:
-        course: what was known at each pair, in the order of delivery.
-    """
+    """The window that was followed: the best ISI with its interval, each pair, and how many of a block were inside."""
     figure = Figure(figsize=(8.4, 3.4), layout="constrained")
     above, below = figure.subplots(2, 1, height_ratios=(2.4, 1.0), sharex=True)
     tidied(above, below)

@@ -78,15 +78,7 @@ class InterventionContents:
 
 
 def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> InterventionContents:
-    """What the log of an intervention says; of one whose arm is concealed nothing that would show it.
-
-    Args:
-        record: the log.
-        states: what a reader must know of it.
-
-    Raises:
-        LogError: the log is of no intervention.
-    """
+    """What the log of an intervention says; of one whose arm is concealed nothing that would show it."""
     pairing, intervention = pairing_of(record), record.header.intervention
     arm = "concealed" if record.conceals or intervention is None else intervention.arm.words
     plan, unfinished = pairing.plan, record.given < len(schedule.slots(pairing.plan))

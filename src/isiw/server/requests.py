@@ -50,11 +50,7 @@ class GivenPulses(_Request):
 
     @property
     def trials(self) -> tuple[Trial, ...]:
-        """The pulses as trials.
-
-        Raises:
-            InvalidValueError: not as many amplitudes as intensities, or values that cannot be.
-        """
+        """The pulses as trials."""
         if len(self.mep_mv) != len(self.intensity_pct_rmt):
             raise InvalidValueError(
                 "the pulses that were given before have an amplitude and an intensity each",
