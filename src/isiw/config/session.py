@@ -266,30 +266,20 @@ def simulated_device(
     """The device of a simulated person."""
     if robot is not None:
         return SimulatedDevice(robot_for(robot, seed, person, space))
-    reference = space.reference
-    subject = person.person(seed)
+    reference, subject = space.reference, person.person(seed)
     respond = partial(subject.begin(seed).respond, reference=reference)
-    sets_intensity = isinstance(subject.response, RecruitmentResponse)
-    hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
+    delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
+    stated: dict[str, Any] = {"hit_delay_ms": delay_ms, "conditioning": subject.conditioning}
     if person.kind == "simulated":
-        return SimulatedDevice(
-            SimulatedPerson(
-                respond,
-                reference,
-                hit_delay_ms=hit_delay_ms,
-                conditioning=subject.conditioning,
-                sets_intensity=sets_intensity,
-            )
-        )
+        curve = isinstance(subject.response, RecruitmentResponse)
+        return SimulatedDevice(SimulatedPerson(respond, reference, **stated, sets_intensity=curve))
     if data is None:
         raise ConfigError(
             "the folder of the recorded EMG is missing: recordings are not part of the package, nor taken from a log",
             expected="the folder with the recordings",
             remedy="Give it with --data DIR, or as subject.data in a configuration.",
         )
-    return SimulatedDevice(
-        RecordedPerson(respond, reference, load_recordings(data), seed, hit_delay_ms, subject.conditioning)
-    )
+    return SimulatedDevice(RecordedPerson(respond, reference, load_recordings(data), seed, **stated))
 
 
 def require_device(config: RunConfig, path: Path) -> None:

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from isiw.pairing.course import FollowedPair
+from isiw.pairing.agenda import FollowedPair
 from isiw.pairing.effect import AfterEffect, BlockChange
-from isiw.pairing.pulses import Delivered, TestPulse
+from isiw.pairing.pulses import Delivered, TestPulse, meps_mv
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, explain, saying, tidied
 from isiw.types import FloatArray
 
@@ -46,9 +46,9 @@ def _draw_pulses(axes: Axes, effect: AfterEffect, blocks: Mapping[str, Sequence[
     for number, pct in enumerate(levels):
         colour = _COLOURS[number % len(_COLOURS)]
         beside = 0.0 if len(levels) == 1 else 0.5 * (number / (len(levels) - 1) - 0.5)
-        before_uv = _meps_uv(blocks["before"], pct)
+        before_uv = 1e3 * meps_mv(blocks["before"], pct)
         for place, those in enumerate(blocks.values()):
-            meps_uv = _meps_uv(those, pct)
+            meps_uv = 1e3 * meps_mv(those, pct)
             if not len(meps_uv):
                 continue
             at = place + beside + 0.09 * _spread(len(meps_uv))
@@ -157,10 +157,6 @@ def course_figure(course: Sequence[FollowedPair]) -> Figure:
     below.set(xlabel="pair", ylabel="pairs")
     explain(figure, ncols=3)
     return figure
-
-
-def _meps_uv(pulses: Sequence[TestPulse], pct: float) -> FloatArray:
-    return np.array([1e3 * pulse.mep_mv for pulse in pulses if pulse.intensity_pct_rmt == pct])
 
 
 def _spread(number: int) -> FloatArray:

@@ -12,8 +12,7 @@ from isiw.errors import InvalidValueError, IsiwError
 from isiw.intervention import Arm, Plan
 from isiw.log.record import SessionRecord
 from isiw.pairing import words
-from isiw.pairing.agenda import Agenda
-from isiw.pairing.course import FollowedPair, course_of
+from isiw.pairing.agenda import Agenda, FollowedPair, course_of
 from isiw.pairing.effect import AfterEffect, BlockChange, change_of
 from isiw.pairing.pulses import Delivered, TestPulse, pairing_of
 from isiw.plots.intervention import change_figure, course_figure, dose_figure
