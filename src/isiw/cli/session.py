@@ -94,7 +94,7 @@ def run(
         )
         show(isiw.config.session.assumed_space(settings) or "Preparing the session …")
         session = isiw.config.session_for(settings)
-        if imported := isiw.config.session.imported_said(settings):
+        if imported := isiw.config.given.given_before(settings).sentence(settings):
             show(imported)
         _run_to_the_end(session, config, live=live)
 
