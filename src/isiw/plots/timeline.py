@@ -66,8 +66,8 @@ def _other_event(record: SessionRecord) -> dict[str, float]:
 
 def _draw_window(axes: Axes, estimate: Estimate, span_ms: tuple[float, float]) -> None:
     segments = estimate.window.segments if estimate.window else ()
-    for number, (start, end) in enumerate(segments):
-        axes.axvspan(start, end, ymin=0.1, ymax=0.62, color=BLUE, alpha=0.3, lw=0, label=None if number else "window")
+    for start, end in segments:
+        axes.axvspan(start, end, ymin=0.1, ymax=0.62, color=BLUE, alpha=0.3, lw=0, label="window")
     for height, (name, colour, pair) in zip((0.47, 0.34), edge_intervals(estimate, *span_ms), strict=False):
         if segments:
             label = f"90 % interval of its {name}"
