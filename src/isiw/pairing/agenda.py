@@ -135,8 +135,7 @@ class Agenda:
         wanted = self._wanted(self._followed)
         centre = _centre(wanted)
         near = min(max(centre, self._centre_ms - self.plan.follow_ms), self._centre_ms + self.plan.follow_ms)
-        moved: FloatArray = np.clip(wanted + (near - centre), self._allowed_ms[0], self._allowed_ms[-1])
-        return moved
+        return np.clip(wanted + (near - centre), self._allowed_ms[0], self._allowed_ms[-1])
 
     def _wanted(self, followed: Followed) -> FloatArray:
         """ISIs of pairs, were there no bound [ms]: that of the largest enhancement, or those of the window."""

@@ -83,8 +83,7 @@ class Movement(Checked):
     def changing(self) -> FloatArray:
         """The same of shares and levels together."""
         shares, levels = _steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling)
-        both: FloatArray = np.kron(shares, levels).astype(float)
-        return both
+        return np.kron(shares, levels).astype(float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,8 +173,7 @@ class Followed:
         """SD of MEPs about their expectation, natural log: the larger, the more of them is enhancement."""
         base = self.baseline_mv[:, None, None]
         share = np.clip(1.0 - base / expected_mv, 0.0, 1.0)
-        spread: FloatArray = np.hypot((1.0 - share) * _ALONE_LOG_SD, share * self.log_sd)
-        return spread
+        return np.hypot((1.0 - share) * _ALONE_LOG_SD, share * self.log_sd)
 
     def _at(self, values: FloatArray, isi_ms: float) -> FloatArray:
         """Values at an ISI between those at which they are known, (s, shifts)."""
@@ -191,15 +189,13 @@ class Followed:
     @cached_property
     def _placed(self) -> FloatArray:
         """Weights of profiles, shifts and shares, (s, shifts, shares)."""
-        placed: FloatArray = self.weights.sum((0, -1))
-        return placed
+        return self.weights.sum((0, -1))
 
     @cached_property
     def enhancement_mv(self) -> FloatArray:
         """The expected enhancement at each ISI [mV], shape (t,)."""
         left = self._placed @ SHARES
-        mean: FloatArray = _mean(left, self.profiles_mv) - float(left.sum(-1) @ self.baseline_mv)
-        return mean
+        return _mean(left, self.profiles_mv) - float(left.sum(-1) @ self.baseline_mv)
 
     @cached_property
     def p_inside(self) -> FloatArray:
@@ -235,8 +231,7 @@ def _interval(values: FloatArray, weights: FloatArray, level: float) -> tuple[fl
 
 def _mean(weights: FloatArray, values: FloatArray) -> FloatArray:
     """The mean of values (..., t) over all but the last axis, shape (t,)."""
-    mean: FloatArray = weights.ravel() @ values.reshape(weights.size, -1)
-    return mean
+    return weights.ravel() @ values.reshape(weights.size, -1)
 
 
 def _shifted(values: FloatArray, isi_ms: FloatArray) -> FloatArray:

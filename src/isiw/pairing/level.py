@@ -141,8 +141,7 @@ def _kept(persistence: float, at: FloatArray) -> FloatArray:
     nodes = np.linspace(0.0, 1.0, 5)
     places = at[:, :1] + nodes * (at[:, 1:] - at[:, :1])
     apart = np.abs(places[:, None, :, None] - places[None, :, None, :])
-    kept: FloatArray = (persistence**apart).mean(axis=(2, 3))
-    return kept
+    return (persistence**apart).mean(axis=(2, 3))
 
 
 class _Quadratic(NamedTuple):
