@@ -56,5 +56,5 @@ def _names(one: Any) -> str:
 
 def _meaning(one: Any) -> str:
     default = one.default
-    shown = getattr(one, "show_default", True) and default not in (None, False, True, []) and not callable(default)
+    shown = default not in (None, False, True, [], "") and not callable(default)
     return " ".join(filter(None, [one.help, f"Default: `{default}`." if shown else ""]))

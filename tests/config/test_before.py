@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import isiw
+from isiw.config.given import Before, given_before
 from isiw.config.run import RunConfig, load_config
 from isiw.config.session import device_for, earlier_trials, intervention_for, session_for
 from isiw.devices.protocol import info_of
@@ -38,6 +39,10 @@ after_min = [0]
 """
 
 
+def known_before(config: RunConfig) -> Before:
+    return earlier_trials(config, info_of(device_for(config)), given_before(config))
+
+
 @pytest.fixture
 def config(tmp_path: Path) -> RunConfig:
     """Of a visit in which thirty pulses over the curve came first, and then a search."""
@@ -54,7 +59,7 @@ def config(tmp_path: Path) -> RunConfig:
 def test_pulses_before_the_search_count_for_what_follows_it(config: RunConfig, tmp_path: Path) -> None:
     search = tmp_path / "search.mcap"
     after = config.with_overrides(log=tmp_path / "pair.mcap", earlier=[search])
-    given, own = earlier_trials(after, info_of(device_for(after))).trials, len(isiw.read_session(search).table)
+    given, own = known_before(after).trials, len(isiw.read_session(search).table)
     assert len(given) == 30 + own
     with pytest.raises(InvalidValueError, match=f"{30 + own} given before"):
         intervention_for(after).require_effect()
@@ -63,7 +68,7 @@ def test_pulses_before_the_search_count_for_what_follows_it(config: RunConfig, t
 def test_pulses_that_are_named_again_count_once(config: RunConfig, tmp_path: Path) -> None:
     both = config.with_overrides(earlier=[tmp_path / "curve.csv", tmp_path / "search.mcap"])
     alone = config.with_overrides(earlier=[tmp_path / "search.mcap"])
-    lengths = [len(earlier_trials(each, info_of(device_for(each))).trials) for each in (both, alone)]
+    lengths = [len(known_before(each).trials) for each in (both, alone)]
     assert lengths[0] == lengths[1]
 
 
@@ -75,7 +80,7 @@ def test_trials_that_a_later_session_had_learnt_count_once_whatever_the_order(
     own = sum(len(isiw.read_session(log).table) for log in (first, second))
     for order in ([first, second], [second, first]):
         both = config.with_overrides(earlier=order)
-        assert len(earlier_trials(both, info_of(device_for(both))).trials) == 30 + own
+        assert len(known_before(both).trials) == 30 + own
 
 
 def test_a_change_that_was_noted_in_the_search_is_known_afterwards_and_on_resuming(tmp_path: Path) -> None:
@@ -98,7 +103,7 @@ def test_a_change_that_was_noted_in_the_search_is_known_afterwards_and_on_resumi
     )
     searching.run(progress=False)
     after = config.with_overrides(log=tmp_path / "next.mcap", earlier=[tmp_path / "search.mcap"])
-    assert earlier_trials(after, info_of(device_for(after))).changed_after == {3}
+    assert known_before(after).changed_after == {3}
     strategy = session_for(after).strategy
     assert strategy.earlier_changed == (3,)
     assert strategy.restarted().estimate().probability == strategy.estimate().probability

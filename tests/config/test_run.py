@@ -8,8 +8,9 @@ import pytest
 import tomli_w
 
 from isiw.config import RunConfig, device_for, load_config, session_for
+from isiw.config.given import given_before
 from isiw.config.resume import Truth, run_of_log, truth_of
-from isiw.config.session import assumed_space, fresh_log_path, imported_said
+from isiw.config.session import assumed_space, fresh_log_path
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
@@ -361,7 +362,7 @@ def test_a_session_after_a_search_for_the_threshold_knows_its_pulses_and_counts_
     assert (len(header.earlier), header.given_before, header.limits.max_pulses) == (8, 8, 9)
     assert [trial.intensity_pct_rmt for trial in header.earlier[-2:]] == [110.0, 130.0]
     assert not header.earlier_same_level
-    said = imported_said(config)
+    said = given_before(config).sentence(config)
     assert "6 pulses of the search for the threshold came before" in said
     assert "of FCR, at the same hot spot" in said
 
@@ -375,7 +376,8 @@ def test_a_search_of_another_muscle_or_person_is_refused_and_one_without_a_muscl
         with pytest.raises(ConfigError, match=says):
             session_for(config.with_overrides(log=tmp_path / "a.mcap"))
     log = threshold_log(tmp_path, "")
-    assert f"not stated in {log.name}" in imported_said(load_config(config_file(f'after = ["{log.name}"]\n{VISIT}')))
+    config = load_config(config_file(f'after = ["{log.name}"]\n{VISIT}'))
+    assert f"not stated in {log.name}" in given_before(config).sentence(config)
 
 
 @pytest.mark.parametrize(

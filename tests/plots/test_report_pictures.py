@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from isiw.log.record import SessionRecord
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
-from isiw.plots.timeline import course_figure, sweeps_figure, timeline_figure
+from isiw.plots.timeline import all_sweeps_figure, course_figure, timeline_figure
 from known import instance, known
 from report.sessions import pulsed, tapped
 
@@ -36,7 +36,7 @@ def line_of(axes: Axes, label: str) -> tuple[list[float], list[float]]:
 
 
 def test_sweeps_are_stacked_by_isi_with_the_hits_before_the_pulse(record: SessionRecord) -> None:
-    figure = known(sweeps_figure(record))
+    figure = known(all_sweeps_figure(record))
     (axes,) = figure.axes
     told = sorted(record.table.told, key=lambda trial: -1 if trial.isi_ms is None else trial.isi_ms)
     labels = [tick.get_text() for tick in axes.get_yticklabels()]
@@ -49,7 +49,7 @@ def test_sweeps_are_stacked_by_isi_with_the_hits_before_the_pulse(record: Sessio
 
 
 def test_after_an_electrical_pulse_no_hammer_hits(record: SessionRecord) -> None:
-    sweeps, timeline = known(sweeps_figure(pulsed(record))), timeline_figure(pulsed(record))
+    sweeps, timeline = known(all_sweeps_figure(pulsed(record))), timeline_figure(pulsed(record))
     assert "electrical pulse" in legend(sweeps)
     assert "hit of the hammer" not in legend(sweeps)
     assert [text.get_text() for text in timeline.axes[0].texts] == ["electrical pulse"]
@@ -59,7 +59,7 @@ def test_after_an_electrical_pulse_no_hammer_hits(record: SessionRecord) -> None
 def test_the_offset_of_an_amplifier_moves_no_trace(record: SessionRecord) -> None:
     def traces(offset_mv: float) -> list[Any]:
         waves = {key: replace(channel, values=channel.values + offset_mv) for key, channel in record.waveforms.items()}
-        (axes,) = known(sweeps_figure(replace(record, waveforms=waves))).axes
+        (axes,) = known(all_sweeps_figure(replace(record, waveforms=waves))).axes
         return [segment for item in axes.collections for segment in instance(LineCollection, item).get_segments()]
 
     for moved, there in zip(traces(5.0), traces(0.0), strict=True):
@@ -74,7 +74,7 @@ def test_an_artefact_is_left_out_of_the_stacked_sweeps_and_an_mep_is_not(record:
             is_artefact = np.abs(after_ms - known(record.table[trial].t_tms_ms)) < 1
             added = artefact_mv * is_artefact if name == "emg" else 0.0
             waves[trial, name] = replace(channel, values=channel.values + added)
-        (axes,) = known(sweeps_figure(replace(record, waveforms=waves))).axes
+        (axes,) = known(all_sweeps_figure(replace(record, waveforms=waves))).axes
         return [segment for item in axes.collections for segment in instance(LineCollection, item).get_segments()]
 
     def points(segment: Any, low_ms: float, high_ms: float) -> Any:
@@ -87,11 +87,11 @@ def test_an_artefact_is_left_out_of_the_stacked_sweeps_and_an_mep_is_not(record:
 
 
 def test_without_emg_there_are_no_sweeps_to_draw(record: SessionRecord) -> None:
-    assert sweeps_figure(replace(record, waveforms={})) is None
+    assert all_sweeps_figure(replace(record, waveforms={})) is None
     unknown = {key: replace(channel, unit="counts") for key, channel in record.waveforms.items()}
-    assert sweeps_figure(replace(record, waveforms=unknown)) is None
+    assert all_sweeps_figure(replace(record, waveforms=unknown)) is None
     blank = {key: replace(channel, values=channel.values * np.nan) for key, channel in record.waveforms.items()}
-    assert sweeps_figure(replace(record, waveforms=blank)) is None
+    assert all_sweeps_figure(replace(record, waveforms=blank)) is None
 
 
 def test_timing_and_rest_are_those_of_the_log_beside_their_limits(record: SessionRecord) -> None:

@@ -8,8 +8,7 @@ import pytest
 from isiw.intervention import Arm
 from isiw.log.record import read_session
 from isiw.pairing import Delivered
-from isiw.pairing.agenda import Agenda
-from isiw.pairing.course import FollowedPair, course_of
+from isiw.pairing.agenda import Agenda, FollowedPair, course_of
 from isiw.pairing.pulses import pairing_of
 from isiw.pairing.words import NOT_YET
 from isiw.report.intervention import InterventionContents, intervention_page

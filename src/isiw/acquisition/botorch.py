@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from isiw.lazy import torch
 from isiw.models.protocol import HasBotorchModel
-from isiw.types import Array, FloatArray
+from isiw.types import Array
 
 
 @dataclass(frozen=True)
@@ -33,5 +33,4 @@ class BotorchAcquisition:
         with torch.no_grad(), torch.random.fork_rng(devices=[]):
             torch.default_generator.manual_seed(self.seed)
             scores = [self.make(posterior.botorch_model(person))(inputs) for person in range(posterior.people)]
-        found: FloatArray = torch.stack(scores).double().numpy()
-        return found
+        return torch.stack(scores).double().numpy()

@@ -109,17 +109,11 @@ class OwnProposal:
 
 
 def stops_ms(space: DesignSpace, step_ms: float) -> FloatArray:
-    """The ISIs of a sweep from the first one on [ms], shape (t,).
-
-    Args:
-        space: the design space.
-        step_ms: from one to the next [ms]; if that is none of the grid's, the next multiple of its step.
-    """
+    """The ISIs of a sweep from the first one on [ms], shape (t,); steps are multiples of the space's own."""
     if space.isis_ms:
         stops_ms = [space.isis_ms[0]]
         stops_ms += [i for i in space.isis_ms if i - stops_ms[-1] >= step_ms - 1e-9]
         return np.array(stops_ms)
     whole_ms = space.step_ms * math.ceil(step_ms / space.step_ms - 1e-9)
     stops = math.floor((space.high_ms - space.low_ms) / whole_ms + 1e-9) + 1
-    isis_ms: FloatArray = space.low_ms + whole_ms * np.arange(stops, dtype=np.float64)
-    return isis_ms
+    return space.low_ms + whole_ms * np.arange(stops, dtype=np.float64)

@@ -41,8 +41,7 @@ class LogExpectedImprovement:
         steps = (profiles - best) / scale
         # log softplus(x) is x itself far below the hinge, where softplus would underflow.
         log_hinge = np.where(steps < -15.0, steps, np.log(np.logaddexp(0.0, np.maximum(steps, -15.0))))
-        score: Array = scipy.special.logsumexp(log_hinge, axis=1, b=1.0 / profiles.shape[1]) + np.log(scale[..., 0])
-        return score
+        return scipy.special.logsumexp(log_hinge, axis=1, b=1.0 / profiles.shape[1]) + np.log(scale[..., 0])
 
 
 @dataclass(frozen=True)
@@ -59,8 +58,7 @@ class UpperConfidenceBound(Checked):
     def __call__(self, posterior: SamplesProfiles, isi_ms: Array) -> Array:
         """The upper bound of the expected MEP [mV], shape (b, t)."""
         profiles = posterior.profiles_mv(isi_ms)
-        bound: Array = profiles.mean(axis=1) + self.width_sd * profiles.std(axis=1)
-        return bound
+        return profiles.mean(axis=1) + self.width_sd * profiles.std(axis=1)
 
 
 @dataclass(frozen=True)
@@ -79,8 +77,7 @@ class Thompson:
         profiles = posterior.profiles_mv(isi_ms)
         people, samples = profiles.shape[:2]
         rng = np.random.default_rng([self.seed, 1 + posterior.trials])  # [seed, 0] is the stream of seed
-        sampled: Array = profiles[np.arange(people), rng.integers(samples, size=people)]
-        return sampled
+        return profiles[np.arange(people), rng.integers(samples, size=people)]
 
 
 @dataclass(frozen=True)
@@ -94,5 +91,4 @@ class KnowledgeGradient:
         profiles = posterior.profiles_mv(isi_ms)
         ahead = lookahead(posterior.outcome_mass(isi_ms), profiles)
         later = (ahead.probability * ahead.mean.max(axis=-1)).sum(-1)
-        gain: Array = later - profiles.mean(axis=1).max(axis=-1, keepdims=True)
-        return gain
+        return later - profiles.mean(axis=1).max(axis=-1, keepdims=True)

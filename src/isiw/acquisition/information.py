@@ -33,8 +33,7 @@ class _CountedWindows(Posterior, ForeseesWindows, Protocol):
 
 def _entropy(mass: Array) -> Array:
     # Probabilities that are practically 0 add practically nothing.
-    entropy: Array = -(np.log(np.maximum(mass, 1e-30)) * mass).sum(-1)
-    return entropy
+    return -(np.log(np.maximum(mass, 1e-30)) * mass).sum(-1)
 
 
 def _foreseen(posterior: PredictsOutcomes, isi_ms: Array) -> Iterable[Singles | engine.Foreseen]:

@@ -9,14 +9,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
-from isiw.models.protocol import (
-    Conditions,
-    Posterior,
-    PredictsOutcomes,
-    ProposesIsi,
-    SamplesProfiles,
-    SamplesWindows,
-)
+from isiw.models.protocol import Conditions, Posterior, PredictsOutcomes, ProposesIsi, SamplesProfiles, SamplesWindows
 from isiw.types import Array, IntArray
 
 _GOLDEN = (5**0.5 - 1) / 2
@@ -114,8 +107,7 @@ def best_candidate(scores: Array, first: int = 0) -> IntArray:
     """Index of the best candidate for each person, shape (b,); a score that is not finite loses."""
     ranked = np.where(np.isfinite(scores), scores, -np.inf)
     from_first = np.concatenate((ranked[..., first:], ranked[..., :first]), axis=-1)
-    best: IntArray = (from_first.argmax(-1) + first) % scores.shape[-1]
-    return best
+    return (from_first.argmax(-1) + first) % scores.shape[-1]
 
 
 def own_plan(posterior: Posterior, acquisition: AcquisitionFunction) -> list[float]:

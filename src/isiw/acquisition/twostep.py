@@ -37,8 +37,7 @@ def expected_variance_reduction(mass: Array, values: Array, weights: Array | Non
     mean = values.mean(axis=1, keepdims=True) if weights is None else weights[:, None] @ values
     # Centred, so that a small reduction is not the difference of two large numbers.
     ahead = lookahead(mass, values - mean, weights)
-    reduction: Array = (ahead.probability * np.square(ahead.mean).sum(-1)).sum(-1)
-    return reduction
+    return (ahead.probability * np.square(ahead.mean).sum(-1)).sum(-1)
 
 
 @dataclass(frozen=True)
@@ -78,12 +77,10 @@ def _grouped(mass: Array, groups: int) -> Array:
     predicted = mass.mean(axis=1)
     middle = predicted.cumsum(-1) - 0.5 * predicted
     group = (middle * groups).astype(int).clip(0, groups - 1)
-    by_group: Array = mass @ np.eye(groups, dtype=mass.dtype)[group]
-    return by_group
+    return mass @ np.eye(groups, dtype=mass.dtype)[group]
 
 
 def _best_gain(mass: Array, masks: Array, weights: Array) -> Array:
     """The largest gain of any candidate among samples of given weights (b, s), shape (b,)."""
     share = weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
-    gain: Array = expected_variance_reduction(mass, masks, share).max(-1)
-    return gain
+    return expected_variance_reduction(mass, masks, share).max(-1)

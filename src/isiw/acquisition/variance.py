@@ -21,8 +21,7 @@ class ProfileVariance:
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Array) -> Array:
         """The variance at each ISI [mV²], shape (b, t)."""
-        variance: Array = posterior.profiles_mv(isi_ms).var(axis=1)
-        return variance
+        return posterior.profiles_mv(isi_ms).var(axis=1)
 
 
 @dataclass(frozen=True)

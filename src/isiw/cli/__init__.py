@@ -14,12 +14,7 @@ from isiw.cli.console import SESSIONS, STUDIES, show
 
 __all__ = ["app"]
 
-app = typer.Typer(
-    name="isiw",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
+app = typer.Typer(name="isiw", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 for commands in (session, tasks, analyse, logs, study):
     app.add_typer(commands.app)
 app.add_typer(study.prior, name="prior", rich_help_panel=STUDIES)

@@ -14,17 +14,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 import isiw
-from isiw.cli.console import (
-    LOGS,
-    NO_DEFAULT,
-    STUDIES,
-    Overwrite,
-    errors_reported,
-    free_beside,
-    show,
-    ticking,
-    working,
-)
+from isiw.cli.console import LOGS, STUDIES, Overwrite, Picture, errors_reported, free_beside, show, ticking, working
 from isiw.text.sanitize import command, counted
 
 if TYPE_CHECKING:
@@ -32,6 +22,8 @@ if TYPE_CHECKING:
     from isiw.existing.batch import Person, Way
 
 app = typer.Typer()
+
+Only = Annotated[str | None, typer.Option(help="The code of the one person who is wanted.")]
 
 
 class Reading(NamedTuple):
@@ -41,8 +33,8 @@ class Reading(NamedTuple):
     limits: dict[str, Any]  # of `existing.batch.Way` and `existing.look`
 
 
-def _reading(  # noqa: PLR0913, PLR0917 - an option each
-    reference: Annotated[str | None, typer.Option(help="What ISIs count from: impact, or valve.", **NO_DEFAULT)] = None,
+def _reading(
+    reference: Annotated[str | None, typer.Option(help="What ISIs count from: impact, or valve.")] = None,
     column: Annotated[
         list[str] | None,
         typer.Option("--column", metavar="KEY=NAME", help='What a column holds, such as "isi=Delay"; repeat it.'),
@@ -63,18 +55,14 @@ def _reading(  # noqa: PLR0913, PLR0917 - an option each
     ] = None,
     unmarked: Annotated[
         str | None,
-        typer.Option(
-            help="What pulses without a marked tap are: TMS alone, or lost (the marker is missing).", **NO_DEFAULT
-        ),
+        typer.Option(help="What pulses without a marked tap are: TMS alone, or lost (the marker is missing)."),
     ] = None,
-    alone: Annotated[str | None, typer.Option(help="What stands for the ISI of TMS alone.", **NO_DEFAULT)] = None,
-    decimal: Annotated[str | None, typer.Option(help="The decimal sign of the file.", **NO_DEFAULT)] = None,
-    sheet: Annotated[str | None, typer.Option(help="The sheet of a workbook.", **NO_DEFAULT)] = None,
-    layout: Annotated[
-        Path | None, typer.Option("--layout", help="How the files are laid out (TOML).", **NO_DEFAULT)
-    ] = None,
+    alone: Annotated[str | None, typer.Option(help="What stands for the ISI of TMS alone.")] = None,
+    decimal: Annotated[str | None, typer.Option(help="The decimal sign of the file.")] = None,
+    sheet: Annotated[str | None, typer.Option(help="The sheet of a workbook.")] = None,
+    layout: Annotated[Path | None, typer.Option("--layout", help="How the files are laid out (TOML).")] = None,
     also: Annotated[
-        list[Path] | None, typer.Option(help="A file elsewhere that a recording may refer to; repeat it.", **NO_DEFAULT)
+        list[Path] | None, typer.Option(help="A file elsewhere that a recording may refer to; repeat it.")
     ] = None,
     larger: Annotated[float, typer.Option(help="By what to multiply the limits of reading a file.")] = 1.0,
 ) -> Reading:
@@ -109,19 +97,17 @@ def reads_files(command: Callable[..., None]) -> Callable[..., None]:
 
 @app.command(rich_help_panel=LOGS)
 @reads_files
-def analyse(  # noqa: PLR0913 - an option each
-    files: Annotated[list[Path], typer.Argument(help="Tables, recordings or logs; docs/your-data.md.", **NO_DEFAULT)],
+def analyse(
+    files: Annotated[list[Path], typer.Argument(help="Tables, recordings or logs; docs/your-data.md.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The log to write (.mcap), or a folder.", **NO_DEFAULT)
+        Path | None, typer.Option("--output", "-o", help="The log to write (.mcap), or a folder.")
     ] = None,
     *,
     reading: Callable[[], Reading],
-    config: Annotated[
-        Path | None, typer.Option(help="Space, strategy, seed and visit as for isiw run (TOML).", **NO_DEFAULT)
-    ] = None,
-    strategy: Annotated[str | None, typer.Option(help="The strategy; see isiw strategies.", **NO_DEFAULT)] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the analysis.", **NO_DEFAULT)] = None,
-    only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
+    config: Annotated[Path | None, typer.Option(help="Space, strategy, seed and visit as for isiw run (TOML).")] = None,
+    strategy: Annotated[str | None, typer.Option(help="The strategy; see isiw strategies.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the analysis.")] = None,
+    only: Only = None,
     simulated: Annotated[bool, typer.Option("--simulated", help="The trials are simulated.")] = False,
     look: Annotated[bool, typer.Option("--look", help="Say what is in the files, and analyse nothing.")] = False,
 ) -> None:
@@ -146,14 +132,14 @@ def analyse(  # noqa: PLR0913 - an option each
 @app.command(rich_help_panel=STUDIES)
 @reads_files
 def replay(
-    file: Annotated[Path, typer.Argument(help="A table, a recording, or a log.", **NO_DEFAULT)],
+    file: Annotated[Path, typer.Argument(help="A table, a recording, or a log.")],
     strategy: Annotated[list[str] | None, typer.Option(help="A name that isiw strategies lists; repeat it.")] = None,
     seeds: Annotated[int, typer.Option(help="How many times each strategy is run, with other draws.")] = 5,
     trials: Annotated[int, typer.Option(help="How many stimuli each time.")] = 60,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
+    output: Picture = None,
     *,
     reading: Callable[[], Reading],
-    only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
+    only: Only = None,
     overwrite: Overwrite = False,
 ) -> None:
     """How many stimuli would it have taken? Strategies choose ISIs, and the trials of a file answer."""

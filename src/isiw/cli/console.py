@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -32,11 +32,9 @@ INTERRUPTED = 130  # what shells report for Ctrl-C
 
 SESSIONS, LOGS, STUDIES = "Sessions and devices", "Logs", "Strategies, priors and studies"  # panels of isiw --help
 
-NO_DEFAULT: dict[str, Any] = {"show_default": False}
 
-Beside = Annotated[
-    Path | None, typer.Option("--output", "-o", help="The file to write; by default beside the log.", **NO_DEFAULT)
-]
+Beside = Annotated[Path | None, typer.Option("--output", "-o", help="The file to write; by default beside the log.")]
+Picture = Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.")]
 Overwrite = Annotated[bool, typer.Option(help="Replace an existing file (never a log).")]
 
 

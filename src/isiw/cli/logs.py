@@ -11,7 +11,6 @@ import typer
 import isiw
 from isiw.cli.console import (
     LOGS,
-    NO_DEFAULT,
     Beside,
     Overwrite,
     counting,
@@ -29,13 +28,13 @@ app = typer.Typer()
 
 _MOST_LISTED = 400
 
-Log = Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)]
+Number = Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")]
+Log = Annotated[Path, typer.Argument(help="A session's log.")]
 
 
 @app.command("show", rich_help_panel=LOGS)
 def show_log(
-    log: Log,
-    whole: Annotated[bool, typer.Option("--all", help="List all trials and events of a long log.")] = False,  # noqa: FBT002 - a flag
+    log: Log, whole: Annotated[bool, typer.Option("--all", help="List all trials and events of a long log.")] = False
 ) -> None:
     """Say who, when and with what, list the trials, and say what was found; works on a damaged log, too."""
     with errors_reported():
@@ -65,22 +64,14 @@ def _list(what: str, lines: list[str], *, whole: bool) -> None:
 
 
 @app.command(rich_help_panel=LOGS)
-def plot(
-    log: Log,
-    output: Beside = None,
-    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
-) -> None:
+def plot(log: Log, output: Beside = None, overwrite: Overwrite = False) -> None:
     """Draw a session: profile, trials, window, and how the edges developed (.png, .pdf, .svg …)."""
     with errors_reported():
         _save("picture", isiw.plots.save_session_plot, log, output, ".png", overwrite=overwrite)
 
 
 @app.command(rich_help_panel=LOGS)
-def report(
-    log: Log,
-    output: Beside = None,
-    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
-) -> None:
+def report(log: Log, output: Beside = None, overwrite: Overwrite = False) -> None:
     """Write a page about a session: what was found and how, trial by trial, for any browser, without a network."""
     with errors_reported():
         _save("report", isiw.report.save_report, log, output, ".html", overwrite=overwrite)
@@ -104,9 +95,7 @@ def _save(
 
 @app.command(rich_help_panel=LOGS)
 def exclude(
-    log: Log,
-    trial: Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")],
-    reason: Annotated[str, typer.Option(help="The reason, for readers of the log.")],
+    log: Log, trial: Number, reason: Annotated[str, typer.Option(help="The reason, for readers of the log.")]
 ) -> None:
     """Exclude a trial afterwards. Nothing is erased; isiw estimate and isiw resume learn without it."""
     with errors_reported():
@@ -116,10 +105,7 @@ def exclude(
 
 
 @app.command(rich_help_panel=LOGS)
-def include(
-    log: Log,
-    trial: Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")],
-) -> None:
+def include(log: Log, trial: Number) -> None:
     """Let an excluded trial count again; isiw estimate and isiw resume learn with it."""
     with errors_reported():
         isiw.include(log, trial)
@@ -144,12 +130,12 @@ def estimate(log: Log) -> None:
 
 @app.command(rich_help_panel=LOGS)
 def export(
-    source: Annotated[Path, typer.Argument(help="A session's log, or a folder of logs.", **NO_DEFAULT)],
-    folder: Annotated[Path, typer.Argument(help="A new folder; nothing is replaced.", **NO_DEFAULT)],
+    source: Annotated[Path, typer.Argument(help="A session's log, or a folder of logs.")],
+    folder: Annotated[Path, typer.Argument(help="A new folder; nothing is replaced.")],
     to: Annotated[
         Literal["csv", "parquet", "bids"], typer.Option(help="Tables, or a BIDS data set with the sweeps.")
     ] = "csv",
-    pseudonymise: Annotated[  # noqa: FBT002 - a flag of the command line
+    pseudonymise: Annotated[
         bool, typer.Option("--pseudonymise", help="Replace codes and dates, leave out notes; see docs/export.md.")
     ] = False,
 ) -> None:
@@ -170,11 +156,9 @@ def export(
 
 @app.command(rich_help_panel=LOGS)
 def compare(
-    logs: Annotated[list[Path], typer.Argument(help="Logs; each is compared to the first.", **NO_DEFAULT)],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Page (.html) or picture to write.", **NO_DEFAULT)
-    ] = None,
-    overwrite: Overwrite = False,  # noqa: FBT002 - a flag
+    logs: Annotated[list[Path], typer.Argument(help="Logs; each is compared to the first.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page (.html) or picture to write.")] = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Compare the windows of sessions: of one person on several days, or of several people."""
     with errors_reported():
@@ -199,7 +183,7 @@ def compare(
 def correlate(
     log: Log,
     measured: Annotated[
-        Path, typer.Argument(help="A log with the measured MEPs, such as that of a sweep over all ISIs.", **NO_DEFAULT)
+        Path, typer.Argument(help="A log with the measured MEPs, such as that of a sweep over all ISIs.")
     ],
 ) -> None:
     """Correlate the estimated profile of a log with the mean MEPs by ISI of another one (Fig. 4.23)."""

@@ -12,7 +12,6 @@ import typer
 
 import isiw
 from isiw.cli.console import (
-    NO_DEFAULT,
     NOT_OVER,
     SESSIONS,
     counting,
@@ -34,8 +33,8 @@ app = typer.Typer()
 
 _INTERRUPTED = "Interrupted: the device is disarmed and the log is closed."
 
-Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
-Day = Annotated[int | None, typer.Option(help="The number of the person's visit, for the log.", **NO_DEFAULT)]
+Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.")]
+Day = Annotated[int | None, typer.Option(help="The number of the person's visit, for the log.")]
 Earlier = Annotated[
     list[Path] | None,
     typer.Option(
@@ -44,32 +43,29 @@ Earlier = Annotated[
         "of a session below the threshold, about whose window it looks."
     ),
 ]
+NewLog = Annotated[Path | None, typer.Option(help="The log's file; by default a new one in isiw-sessions.")]
+Operator = Annotated[str | None, typer.Option(help="Who runs the session, for the log.")]
 Live = Annotated[
     bool, typer.Option("--live", help="Show the session in the browser while it runs, and operate it there.")
 ]
 
 
 @app.command(rich_help_panel=SESSIONS)
-def run(  # noqa: PLR0913, PLR0917 - an option each
-    config: Annotated[Path | None, typer.Argument(help="A configuration file (TOML).", **NO_DEFAULT)] = None,
+def run(
+    config: Annotated[Path | None, typer.Argument(help="A configuration file (TOML).")] = None,
     subject: Annotated[
         str | None,
         typer.Option(
             metavar="KIND",
             help="How a person is simulated: simulated, or recorded (simulated MEPs in recorded EMG). The code of the "
             "person who is examined is visit.subject in CONFIG.",
-            **NO_DEFAULT,
         ),
     ] = None,
     data: Data = None,
-    strategy: Annotated[str | None, typer.Option(help="A name that isiw strategies lists.", **NO_DEFAULT)] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Seed of the person, the trials and the strategy.", **NO_DEFAULT)
-    ] = None,
-    log: Annotated[Path | None, typer.Option(help="The log's file; by default a new one in isiw-sessions.")] = None,
-    lab: Annotated[
-        Path | None, typer.Option("--prior", help="A lab's prior, as isiw prior learn writes it.", **NO_DEFAULT)
-    ] = None,
+    strategy: Annotated[str | None, typer.Option(help="A name that isiw strategies lists.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the person, the trials and the strategy.")] = None,
+    log: NewLog = None,
+    lab: Annotated[Path | None, typer.Option("--prior", help="A lab's prior, as isiw prior learn writes it.")] = None,
     after: Earlier = None,
     earlier: Annotated[
         list[Path] | None,
@@ -79,8 +75,8 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
         ),
     ] = None,
     day: Day = None,
-    operator: Annotated[str | None, typer.Option(help="Who runs the session, for the log.", **NO_DEFAULT)] = None,
-    live: Live = False,  # noqa: FBT002 - a flag of the command line
+    operator: Operator = None,
+    live: Live = False,
 ) -> None:
     """Run a session with a simulated person, or with the device of a configuration, and say what was found."""
     with errors_reported():
@@ -98,23 +94,21 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
         )
         show(isiw.config.session.assumed_space(settings) or "Preparing the session …")
         session = isiw.config.session_for(settings)
-        if imported := isiw.config.session.imported_said(settings):
+        if imported := isiw.config.given.given_before(settings).sentence(settings):
             show(imported)
         _run_to_the_end(session, config, live=live)
 
 
 @app.command(rich_help_panel=SESSIONS)
 def pair(
-    config: Annotated[
-        Path | None, typer.Argument(help="A configuration with the section of an intervention.", **NO_DEFAULT)
-    ] = None,
+    config: Annotated[Path | None, typer.Argument(help="A configuration with the section of an intervention.")] = None,
     after: Annotated[
-        Path | None, typer.Option(help="The log of the search, of the same visit, that found the window.", **NO_DEFAULT)
+        Path | None, typer.Option(help="The log of the search, of the same visit, that found the window.")
     ] = None,
-    log: Annotated[Path | None, typer.Option(help="The log's file; by default a new one in isiw-sessions.")] = None,
+    log: NewLog = None,
     day: Day = None,
-    operator: Annotated[str | None, typer.Option(help="Who runs the session, for the log.", **NO_DEFAULT)] = None,
-    live: Live = False,  # noqa: FBT002 - a flag of the command line
+    operator: Operator = None,
+    live: Live = False,
     opens: Annotated[
         Path | None,
         typer.Option("--open", metavar="LOG", help="Say which arm a log is of; the log keeps that it was opened."),
@@ -141,18 +135,17 @@ def pair(
 
 @app.command(rich_help_panel=SESSIONS)
 def resume(
-    log: Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)],
+    log: Annotated[Path, typer.Argument(help="A session's log.")],
     config: Annotated[
         Path | None,
         typer.Argument(help="The configuration with your device; without it, the simulated person of the log is used."),
     ] = None,
     data: Data = None,
     lost_pulses: Annotated[
-        int | None,
-        typer.Option(help="If the end of the log is missing: how many delivered pulses are not in it.", **NO_DEFAULT),
+        int | None, typer.Option(help="If the end of the log is missing: how many delivered pulses are not in it.")
     ] = None,
-    verify: Annotated[bool, typer.Option(help="Check that the strategy chooses the same ISIs as in the log.")] = True,  # noqa: FBT002 - a flag of the command line
-    live: Live = False,  # noqa: FBT002 - a flag of the command line
+    verify: Annotated[bool, typer.Option(help="Check that the strategy chooses the same ISIs as in the log.")] = True,
+    live: Live = False,
 ) -> None:
     """Continue an interrupted session, with its own ISI range and strategy, within the limits in CONFIG."""
     with errors_reported():
@@ -233,18 +226,17 @@ TOKEN = "ISIW_TOKEN"  # noqa: S105 - the variable's name
 
 @app.command(rich_help_panel=SESSIONS)
 def serve(
-    folder: Annotated[Path, typer.Argument(help="The folder for the logs; created if missing.", **NO_DEFAULT)],
+    folder: Annotated[Path, typer.Argument(help="The folder for the logs; created if missing.")],
     host: Annotated[str, typer.Option(help="The address to listen on; any but 127.0.0.1 needs TLS.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="The port; 0 for any that is free.")] = 8473,
     token_file: Annotated[
         Path | None,
         typer.Option(
-            help=f"A file with the token; by default the token is {TOKEN} from the environment, or a random one.",
-            **NO_DEFAULT,
+            help=f"A file with the token; by default the token is {TOKEN} from the environment, or a random one."
         ),
     ] = None,
-    certificate: Annotated[Path | None, typer.Option(help="A TLS certificate (PEM).", **NO_DEFAULT)] = None,
-    key: Annotated[Path | None, typer.Option(help="Its key (PEM).", **NO_DEFAULT)] = None,
+    certificate: Annotated[Path | None, typer.Option(help="A TLS certificate (PEM).")] = None,
+    key: Annotated[Path | None, typer.Option(help="Its key (PEM).")] = None,
 ) -> None:
     """Serve sessions over HTTP to MATLAB, LabVIEW or any other software of this computer."""
     with errors_reported("The server has ended; its sessions can be resumed."):

@@ -17,9 +17,9 @@ from rich.text import Text
 
 import isiw
 from isiw.cli.console import (
-    NO_DEFAULT,
     STUDIES,
     Overwrite,
+    Picture,
     counting,
     errors_reported,
     exit_if_damaged,
@@ -43,7 +43,7 @@ prior = typer.Typer(help="Learn from a lab's own people, for isiw run --prior.",
 
 @app.command(rich_help_panel=STUDIES)
 def strategies(
-    name: Annotated[str | None, typer.Argument(help="A strategy's name: list its settings.", **NO_DEFAULT)] = None,
+    name: Annotated[str | None, typer.Argument(help="A strategy's name: list its settings.")] = None,
 ) -> None:
     """List the named strategies and what each does, or the settings of one."""
     if name is None:
@@ -77,17 +77,17 @@ def _inline(value: Any) -> str:
     return json.dumps(value)
 
 
-LabFile = Annotated[Path, typer.Argument(help="A lab's prior (TOML).", **NO_DEFAULT)]
+LabFile = Annotated[Path, typer.Argument(help="A lab's prior (TOML).")]
 
 
 @prior.command()
 def learn(
-    logs: Annotated[list[Path], typer.Argument(help="The logs of sessions, one a person.", **NO_DEFAULT)],
+    logs: Annotated[list[Path], typer.Argument(help="The logs of sessions, one a person.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The file to write (.toml).")],
-    again: Annotated[bool, typer.Option(help="Count a second session of the same person as another person.")] = False,  # noqa: FBT002 - a flag
-    damaged: Annotated[bool, typer.Option("--damaged", help="Learn what is left of damaged logs.")] = False,  # noqa: FBT002 - a flag
+    again: Annotated[bool, typer.Option(help="Count a second session of the same person as another person.")] = False,
+    damaged: Annotated[bool, typer.Option("--damaged", help="Learn what is left of damaged logs.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 0,
-    overwrite: Overwrite = False,  # noqa: FBT002 - a flag
+    overwrite: Overwrite = False,
 ) -> None:
     """Learn what a lab's people are like from sessions already run. Exit code 3 if a log is damaged."""
     done: list[SessionRecord] = []
@@ -110,11 +110,7 @@ def learn(
 
 
 @prior.command("show")
-def show_prior(
-    source: LabFile,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
-    overwrite: Overwrite = False,  # noqa: FBT002 - a flag
-) -> None:
+def show_prior(source: LabFile, output: Picture = None, overwrite: Overwrite = False) -> None:
     """Show what a lab's people are like, compared with the built-in prior."""
     with errors_reported():
         lab = isiw.priors.read_lab_prior(source)
@@ -138,26 +134,20 @@ def _print(lab: LabPrior, table: pd.DataFrame) -> None:
 
 study = typer.Typer(help="Compare strategies on simulated people.", no_args_is_help=True)
 
-Folder = Annotated[Path, typer.Argument(help="The folder of a study.", **NO_DEFAULT)]
+Folder = Annotated[Path, typer.Argument(help="The folder of a study.")]
 
 
 @study.command()
 def run(
     source: Annotated[
-        Path,
-        typer.Argument(
-            help="A study (TOML), or the folder of one, to continue it, or with --out to begin again.",
-            **NO_DEFAULT,
-        ),
+        Path, typer.Argument(help="A study (TOML), or the folder of one, to continue it, or with --out to begin again.")
     ],
     out: Annotated[
-        Path | None, typer.Option(help="The folder of its results; by default beside it, as NAME.study.", **NO_DEFAULT)
+        Path | None, typer.Option(help="The folder of its results; by default beside it, as NAME.study.")
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Number of processes; by default one per core.", **NO_DEFAULT)
-    ] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on.", **NO_DEFAULT)] = None,
-    retry: Annotated[bool, typer.Option(help="Run what failed again.")] = False,  # noqa: FBT002 - a flag
+    workers: Annotated[int | None, typer.Option(help="Number of processes; by default one per core.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on.")] = None,
+    retry: Annotated[bool, typer.Option(help="Run what failed again.")] = False,
 ) -> None:
     """Run a study, or what is left of it. The exit code is 1 if sessions failed."""
     with errors_reported():
@@ -179,10 +169,10 @@ def run(
 @study.command()
 def replay(
     folder: Folder,
-    key: Annotated[str, typer.Argument(help="A unit's key, or the number of a row of the table.", **NO_DEFAULT)],
-    person: Annotated[int | None, typer.Option(help="Of a batch, compare this person only.", **NO_DEFAULT)] = None,
+    key: Annotated[str, typer.Argument(help="A unit's key, or the number of a row of the table.")],
+    person: Annotated[int | None, typer.Option(help="Of a batch, compare this person only.")] = None,
     study: Annotated[
-        Path | None, typer.Option(help="The study (TOML) that names code of your own, if it has any.", **NO_DEFAULT)
+        Path | None, typer.Option(help="The study (TOML) that names code of your own, if it has any.")
     ] = None,
 ) -> None:
     """Run one session of a study again, alone, and say whether the result is the same."""
@@ -204,8 +194,7 @@ def replay(
 def summary(
     folder: Folder,
     reference: Annotated[
-        str | None,
-        typer.Option(help="The strategy that others are compared with; by default the default.", **NO_DEFAULT),
+        str | None, typer.Option(help="The strategy that others are compared with; by default the default.")
     ] = None,
 ) -> None:
     """Print the mean F1 and the paired differences of a study, and write its tables and pictures into the folder."""

@@ -10,9 +10,9 @@ from rich.console import Console
 
 import isiw
 from isiw.cli.console import (
-    NO_DEFAULT,
     SESSIONS,
     Overwrite,
+    Picture,
     counting,
     errors_reported,
     exit_if_damaged,
@@ -31,11 +31,13 @@ if TYPE_CHECKING:
 app = typer.Typer()
 new = typer.Typer(help="Write a template for your own rig.", no_args_is_help=True)
 
+Code = Annotated[str, typer.Option(help="The person's code, for the log.")]
+
 
 @app.command(rich_help_panel=SESSIONS)
 def check(
     config: Annotated[Path, typer.Argument(help="The configuration with your device.")],
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before stimulating.")] = False,  # noqa: FBT002 - a flag of the command line
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before stimulating.")] = False,
 ) -> None:
     """Check a device, with the coil on a phantom: what it delivers, and whether a session can use it. It stimulates.
 
@@ -78,13 +80,11 @@ def new_rig(
 
 @app.command(rich_help_panel=SESSIONS)
 def timing(
-    source: Annotated[
-        str, typer.Argument(help="A preset of the tapping robot, vane, or a session's log.", **NO_DEFAULT)
-    ],
+    source: Annotated[str, typer.Argument(help="A preset of the tapping robot, vane, or a session's log.")],
     taps: Annotated[int, typer.Option(help="Taps for each ISI of a preset; rotations of vane.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of a preset's taps.")] = 0,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
-    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
+    output: Picture = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Report how repeatable the taps are, or the rotations of the vane actuator: events, ISI errors, mistrials."""
     with errors_reported():
@@ -107,10 +107,10 @@ def _timing_study(source: str, taps: int, seed: int) -> TimingStudy:
 
 
 @app.command(rich_help_panel=SESSIONS)
-def threshold(  # noqa: PLR0913, PLR0917 - an option each
+def threshold(
     context: typer.Context,
-    log: Annotated[Path, typer.Argument(help="The log: a new file, unless --resume or --show is given.", **NO_DEFAULT)],
-    by_hand: Annotated[  # noqa: FBT002 - a flag
+    log: Annotated[Path, typer.Argument(help="The log: a new file, unless --resume or --show is given.")],
+    by_hand: Annotated[
         bool, typer.Option("--by-hand", help="A real person: you set the stimulator, and type each result.")
     ] = False,
     high: Annotated[float, typer.Option(help="The highest intensity [% MSO]; --by-hand needs it.")] = 100.0,
@@ -124,23 +124,20 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         ),
     ] = "bayes",
     enough: Annotated[
-        int | None,
-        typer.Option(help="five-of-ten: how many of ten suffice; default 5, and 6 for more than five.", **NO_DEFAULT),
+        int | None, typer.Option(help="five-of-ten: how many of ten suffice; default 5, and 6 for more than five.")
     ] = None,
-    at: Annotated[
-        list[float] | None, typer.Option(help="curve: an intensity [% MSO]; repeat it for several.", **NO_DEFAULT)
-    ] = None,
-    each: Annotated[int | None, typer.Option(help="curve: pulses at each; default 5.", **NO_DEFAULT)] = None,
+    at: Annotated[list[float] | None, typer.Option(help="curve: an intensity [% MSO]; repeat it for several.")] = None,
+    each: Annotated[int | None, typer.Option(help="curve: pulses at each; default 5.")] = None,
     max_pulses: Annotated[int, typer.Option(help="Largest number of pulses, including lost ones.")] = 100,
     min_iti_s: Annotated[float, typer.Option(help="Shortest time between two pulses, in seconds.")] = 5.0,
-    subject: Annotated[str, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = "",
+    subject: Code = "",
     muscle: Annotated[
-        str, typer.Option(help="Whose MEPs they are, as a session's configuration says under visit.", **NO_DEFAULT)
+        str, typer.Option(help="Whose MEPs they are, as a session's configuration says under visit.")
     ] = "",
     cohort: Annotated[str, typer.Option(help="The cohort that a simulated person comes from.")] = "recruitment",
     seed: Annotated[int, typer.Option(help="Seed of the simulated person, and of the order of a curve.")] = 0,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the log, as it was begun.")] = False,  # noqa: FBT002 - a flag
-    show_only: Annotated[bool, typer.Option("--show", help="Only say what the log holds.")] = False,  # noqa: FBT002 - a flag
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the log, as it was begun.")] = False,
+    show_only: Annotated[bool, typer.Option("--show", help="Only say what the log holds.")] = False,
 ) -> None:
     """Find the resting motor threshold, or the hot spot, of a simulated person, or by hand with a real stimulator."""
     with errors_reported(f"Interrupted. The log is safe; resume with: {_resuming(log)}"):
@@ -224,9 +221,9 @@ def _say_what_is_there(log: Path) -> None:
 
 
 @app.command(rich_help_panel=SESSIONS)
-def interval(  # noqa: PLR0913, PLR0917 - an option each
+def interval(
     context: typer.Context,
-    log: Annotated[Path, typer.Argument(help="The log's file.", **NO_DEFAULT)],
+    log: Annotated[Path, typer.Argument(help="The log's file.")],
     session: Annotated[int, typer.Option(help="1: 300 ms. 2: 500 ms. 3: 300 ms with half the score.")] = 1,
     mode: Annotated[
         list[int] | None,
@@ -235,11 +232,11 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
         ),
     ] = None,
     trials: Annotated[int, typer.Option(help="Trials in each mode.")] = 200,
-    subject: Annotated[str, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = "",
+    subject: Code = "",
     seed: Annotated[int, typer.Option(help="Seed of the lights.")] = 0,
     rest_s: Annotated[float, typer.Option(help="Seconds of rest between two modes.")] = 120.0,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue this log.")] = False,  # noqa: FBT002 - a flag
-    look: Annotated[bool, typer.Option("--show", help="Print what is in this log.")] = False,  # noqa: FBT002 - a flag
+    resume: Annotated[bool, typer.Option("--resume", help="Continue this log.")] = False,
+    look: Annotated[bool, typer.Option("--show", help="Print what is in this log.")] = False,
 ) -> None:
     """Produce time intervals by two key presses, with feedback after each, at a terminal; see docs/interval.md."""
     way_on = isiw.log.LogKind.PRODUCTION.continued_by(log)

@@ -1,4 +1,4 @@
-"""What `after` of a configuration names: sessions, and searches for the threshold whose pulses teach the curve."""
+"""What `after` and `earlier` of a configuration name: sessions, searches for the threshold, and tables of pulses."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Final, NamedTuple
 from isiw.config.run import RunConfig
 from isiw.errors import ConfigError
 from isiw.findings import require_percent
+from isiw.log.continuing import imported_sentence
 from isiw.log.reader import ThresholdRecord
-from isiw.log.record import SessionRecord, read_any
+from isiw.log.record import SessionRecord, read_any, read_session
 from isiw.log.salvage import salvage
 from isiw.log.verdicts import changed_after
 from isiw.session.threshold import search_of
@@ -23,19 +24,40 @@ from isiw.visit import different_muscles
 _COLUMNS: Final = ("intensity_pct_rmt", "mep_mv")
 
 
-def sessions_after(config: RunConfig) -> list[SessionRecord]:
-    """The earlier sessions, whose windows teach a prior."""
-    return [record for record in _read(config) if isinstance(record, SessionRecord)]
+class Given(NamedTuple):
+    """What was given before a session, as the logs and tables say that its configuration names."""
+
+    sessions: list[SessionRecord]  # of `after`, whose windows teach a prior
+    searches: list[ThresholdRecord]  # of `after`, whose pulses are earlier trials
+    earlier: list[SessionRecord]  # of the same visit
+    pulses: list[Trial]  # of tables
+
+    def sentence(self, config: RunConfig) -> str:
+        """That sessions were none, and that pulses of searches are learnt, in words; empty of usual sessions alone."""
+        imported = [each.path.name for each in (*self.sessions, *self.earlier) if each.header.imported]
+        return " ".join(filter(None, (imported_sentence(imported), _of_searches(config, self.searches))))
 
 
-def searches_after(config: RunConfig) -> list[ThresholdRecord]:
-    """The searches for the motor threshold, whose pulses are earlier trials.
+def given_before(config: RunConfig) -> Given:
+    """Read what was given before a session.
 
     Raises:
-        ConfigError: one of another muscle than the visit's, one that is damaged, or none of the visit's pulses over the
-            curve.
+        ConfigError: a search of another muscle than the visit's, one that is damaged, or none of the visit's pulses
+            over the curve; a table that is none of pulses.
+        LogError: a log that cannot be read.
     """
-    searches = [record for record in _read(config) if isinstance(record, ThresholdRecord)]
+    after = [read_any(salvage(path)) for path in config.after]
+    searches = [record for record in after if isinstance(record, ThresholdRecord)]
+    _require_searches(config, searches)
+    return Given(
+        [record for record in after if isinstance(record, SessionRecord)],
+        searches,
+        [read_session(path) for path in config.earlier if not is_table(path)],
+        [pulse for path in config.earlier if is_table(path) for pulse in _pulses_of_table(path)],
+    )
+
+
+def _require_searches(config: RunConfig, searches: Sequence[ThresholdRecord]) -> None:
     for record in searches:
         if record.end_lost or record.losses:
             raise ConfigError(
@@ -51,7 +73,6 @@ def searches_after(config: RunConfig) -> list[ThresholdRecord]:
                 remedy="Leave this file out, or correct visit.muscle.",
             )
     _require_curve(config, searches)
-    return searches
 
 
 def _require_curve(config: RunConfig, searches: Sequence[ThresholdRecord]) -> None:
@@ -78,12 +99,8 @@ def is_table(path: Path) -> bool:
     return path.suffix.lower() == ".csv"
 
 
-def pulses_of_table(path: Path) -> tuple[Trial, ...]:
-    """The pulses of TMS alone in a table of intensities and amplitudes, in the order of its rows.
-
-    Raises:
-        ConfigError: no such file, no table of these two columns, or a cell that is no number.
-    """
+def _pulses_of_table(path: Path) -> tuple[Trial, ...]:
+    """The pulses of TMS alone in a table of intensities and amplitudes, in the order of its rows."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             table = csv.DictReader(file)
@@ -114,9 +131,8 @@ def _pulse(path: Path, number: int, row: Mapping[str, str | None]) -> Trial:
         ) from error
 
 
-def searches_sentence(config: RunConfig) -> str:
+def _of_searches(config: RunConfig, searches: Sequence[ThresholdRecord]) -> str:
     """That pulses of searches are learnt, and what nobody has stated of them; empty if there are none."""
-    searches = searches_after(config)
     if not searches:
         return ""
     said = f"{counted(sum(record.given for record in searches), 'pulse')} of the search for the threshold came before: "
@@ -129,10 +145,6 @@ def _without_muscle(config: RunConfig, searches: Sequence[ThresholdRecord]) -> s
     """Where no muscle is stated, in words; empty if it is everywhere."""
     names = [record.path.name for record in searches if not record.header.muscle.strip()]
     return ", ".join([*([] if config.visit.muscle.strip() else ["[visit]"]), *names])
-
-
-def _read(config: RunConfig) -> list[SessionRecord | ThresholdRecord]:
-    return [read_any(salvage(path)) for path in config.after]
 
 
 class Before(NamedTuple):

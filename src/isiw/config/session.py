@@ -12,15 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
-from isiw.config.given import (
-    Before,
-    before_of,
-    is_table,
-    pulses_of_table,
-    searches_after,
-    searches_sentence,
-    sessions_after,
-)
+from isiw.config.given import Before, Given, before_of, given_before, is_table
 from isiw.config.run import RunConfig, limits_for
 from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
 from isiw.design import DesignSpace
@@ -30,11 +22,11 @@ from isiw.devices.simulated import RecordedPerson, SimulatedDevice, SimulatedPer
 from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
 from isiw.intervention import Intervention
-from isiw.log.continuing import imported_sentence, require_search
+from isiw.log.continuing import require_search
 from isiw.log.headers import RUN_KEY, FirstStep
 from isiw.log.places import log_exists
 from isiw.log.reader import ThresholdRecord
-from isiw.log.record import SessionRecord, read_session
+from isiw.log.record import SessionRecord
 from isiw.log.writer import now
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.supra.prior import SupraPrior
@@ -83,10 +75,9 @@ def write_rig_template(folder: str | Path) -> tuple[Path, ...]:
     return files
 
 
-def settings_with_prior(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:
+def settings_with_prior(config: RunConfig, device: DeviceInfo, earlier: Sequence[SessionRecord]) -> dict[str, Any]:
     """The strategy's settings, with what earlier sessions taught as its prior."""
     settings = dict(config.strategy.settings)
-    earlier = sessions_after(config)
     if config.prior is None and not earlier:
         return settings
     if "prior" in settings:
@@ -129,9 +120,8 @@ def _has_prior(name: str, kind: Prior | SupraPrior) -> bool:
     return True
 
 
-def first_step(config: RunConfig) -> FirstStep | None:
+def first_step(config: RunConfig, earlier: Sequence[SessionRecord]) -> FirstStep | None:
     """The profile of the session below the threshold, the first of two steps; None if this is no second step."""
-    earlier = sessions_after(config)
     return profile_below(earlier[-1]) if earlier and looks_above(config.strategy.name) else None
 
 
@@ -167,13 +157,12 @@ def _require_people(
             _require_like(config, replace(visit, intensity_pct_rmt=None) if any_intensity else visit, record.path)
 
 
-def earlier_trials(config: RunConfig, device: DeviceInfo) -> Before:
+def earlier_trials(config: RunConfig, device: DeviceInfo, given: Given) -> Before:
     """The earlier trials of the visit, which count for the limits, and which a strategy learns before its first ask."""
-    records, searches = [read_session(path) for path in _logs(config)], searches_after(config)
     # A later session may have learnt the trials of an earlier one.
-    records.sort(key=lambda record: (record.header.created, record.header.given_before))
-    _require_people(config, [*records, *searches], device)
-    require_each_once([*records, *sessions_after(config)])
+    records = sorted(given.earlier, key=lambda record: (record.header.created, record.header.given_before))
+    _require_people(config, [*records, *given.searches], device)
+    require_each_once([*records, *given.sessions])
     for record in records:
         require_whole(record, "as a table: isiw export, then isiw analyse")
         header = record.header
@@ -185,26 +174,13 @@ def earlier_trials(config: RunConfig, device: DeviceInfo) -> Before:
                 expected=f"{device.conditioning} and {device.reference}",
                 remedy="Leave this file out.",
             )
-    trials = [*given_pulses(searches)]
-    trials += [pulse for path in config.earlier if is_table(path) for pulse in pulses_of_table(path)]
+    trials = [*given_pulses(given.searches), *given.pulses]
     changed: set[int] = set()
     for record in records:
         before = before_of(record, trials)
         changed |= {len(trials) + place for place in before.changed_after}
         trials += before.trials
     return Before(tuple(trials), frozenset(changed))
-
-
-def _logs(config: RunConfig) -> list[Path]:
-    """The logs of earlier trials."""
-    return [path for path in config.earlier if not is_table(path)]
-
-
-def imported_said(config: RunConfig) -> str:
-    """That some of the earlier sessions were none, in words; empty if all were."""
-    records = [*sessions_after(config), *(read_session(path) for path in _logs(config))]
-    imported = imported_sentence([record.path.name for record in records if record.header.imported])
-    return " ".join(filter(None, (imported, searches_sentence(config))))
 
 
 def require_same_person(config: RunConfig, records: Sequence[SessionRecord | ThresholdRecord]) -> None:
@@ -266,30 +242,20 @@ def simulated_device(
     """The device of a simulated person."""
     if robot is not None:
         return SimulatedDevice(robot_for(robot, seed, person, space))
-    reference = space.reference
-    subject = person.person(seed)
+    reference, subject = space.reference, person.person(seed)
     respond = partial(subject.begin(seed).respond, reference=reference)
-    sets_intensity = isinstance(subject.response, RecruitmentResponse)
-    hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
+    delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
+    stated: dict[str, Any] = {"hit_delay_ms": delay_ms, "conditioning": subject.conditioning}
     if person.kind == "simulated":
-        return SimulatedDevice(
-            SimulatedPerson(
-                respond,
-                reference,
-                hit_delay_ms=hit_delay_ms,
-                conditioning=subject.conditioning,
-                sets_intensity=sets_intensity,
-            )
-        )
+        curve = isinstance(subject.response, RecruitmentResponse)
+        return SimulatedDevice(SimulatedPerson(respond, reference, **stated, sets_intensity=curve))
     if data is None:
         raise ConfigError(
             "the folder of the recorded EMG is missing: recordings are not part of the package, nor taken from a log",
             expected="the folder with the recordings",
             remedy="Give it with --data DIR, or as subject.data in a configuration.",
         )
-    return SimulatedDevice(
-        RecordedPerson(respond, reference, load_recordings(data), seed, hit_delay_ms, subject.conditioning)
-    )
+    return SimulatedDevice(RecordedPerson(respond, reference, load_recordings(data), seed, **stated))
 
 
 def require_device(config: RunConfig, path: Path) -> None:
@@ -326,9 +292,10 @@ def session_for(config: RunConfig, intervention: Intervention | None = None) -> 
         "conditioning": None if info.conditioning == "tap" else info.conditioning,  # a tap may be nothing stated
         "intensity_pct_rmt": config.visit.intensity_pct_rmt,
     }
-    settings = known_settings(config.strategy.name, known) | settings_with_prior(config, info)
+    given = given_before(config)
+    settings = known_settings(config.strategy.name, known) | settings_with_prior(config, info, given.sessions)
     strategy = make_strategy(config.strategy.name, space=space, seed=config.seed, **settings)
-    before = earlier_trials(config, info)
+    before = earlier_trials(config, info, given)
     if before.trials:
         strategy.learn_all(before.trials, changed_after=before.changed_after)
     return Session(
@@ -343,7 +310,7 @@ def session_for(config: RunConfig, intervention: Intervention | None = None) -> 
         visit=config.visit.noted(),
         protocol=config.protocol if intervention is None else VisitProtocol(taps_first=0),
         intervention=intervention,
-        first_step=first_step(config),
+        first_step=first_step(config, given.sessions),
     )
 
 
@@ -361,7 +328,7 @@ def intervention_for(config: RunConfig) -> Session:
             expected='[intervention] with changes_the_person = true and the protocol\'s code, protocol_code = "..."',
             remedy="Write the section if your ethics approval is for such an intervention: docs/pairing.md has one.",
         )
-    if not _logs(config):
+    if all(map(is_table, config.earlier)):
         raise ConfigError(
             "an intervention needs the log of the search for the window",
             remedy="Search for it first, and give its log: isiw pair CONFIG --after WINDOW_LOG",

@@ -86,12 +86,9 @@ def require_isi(limits: Limits, isi_ms: float) -> None:
 
 
 def earliest_s(limits: PulseLimits, times_s: Sequence[float], since_s: float) -> float:
-    """When the next stimulus may come at the earliest [s].
+    """When the next stimulus may come at the earliest [s], after earlier ones at these times [s], which ascend.
 
-    Args:
-        limits: the limits.
-        times_s: when the earlier ones came [s], ascending, shape (n,).
-        since_s: when the session began, or went on [s]; it waits a whole interval before its first stimulus.
+    A session waits a whole interval before its first stimulus from when it began, or went on [s].
     """
     if not times_s:
         return since_s + limits.iti_s

@@ -14,13 +14,7 @@ from isiw.devices.watchdog import Watchdog
 
 
 def armed_by_another(handle: int, arm: bytes, disarm: bytes) -> subprocess.Popen[bytes]:
-    """Start a process that has a watchdog of its own, and arms.
-
-    Args:
-        handle: the connection's number.
-        arm: what it sends to arm, with the line's end.
-        disarm: what its watchdog sends when it is gone.
-    """
+    """Start a process that inherits the connection of this number, has a watchdog of its own, and arms."""
     return subprocess.Popen(  # noqa: S603 - our own module
         [sys.executable, "-m", "isiw.devices.dying", str(handle), arm.hex(), disarm.hex()],
         stdin=subprocess.PIPE,

@@ -164,11 +164,7 @@ def _spline(profile: _Profile) -> ProfileFit:
 
 
 def _scored(
-    name: str,
-    profile: _Profile,
-    curve: Callable[[FloatArray], FloatArray],
-    parameters: float,
-    gaussians: FloatArray,
+    name: str, profile: _Profile, curve: Callable[[FloatArray], FloatArray], parameters: float, gaussians: FloatArray
 ) -> ProfileFit:
     """A curve with its criteria, for normal residuals of unknown variance."""
     isis = len(profile.isi_ms)

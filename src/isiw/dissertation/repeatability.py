@@ -22,14 +22,7 @@ from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_
 from isiw.errors import InvalidValueError
 from isiw.lazy import pd, scipy
 from isiw.log.record import SessionRecord
-from isiw.signals.events import (
-    EMG_DELAY_MS,
-    TapEvents,
-    detect_events,
-    first_rise,
-    impact_times_in_emg,
-    sweep_events,
-)
+from isiw.signals.events import EMG_DELAY_MS, TapEvents, detect_events, first_rise, impact_times_in_emg, sweep_events
 from isiw.signals.impact import VALVE_MS
 from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, rest_level
 from isiw.sweeps import Sweep
@@ -235,11 +228,34 @@ def study_vane(vane: Vane | None = None, *, rotations: int = 100, seed: int = 0)
 
 def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[float | None]) -> TimingStudy:
     """Run the repeatability study on recorded sweeps."""
+    return _study(name, sweeps, commanded_isi_ms, sweep_events)  # which raises if the valve's time is unknown
+
+
+def study_emg(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[float | None]) -> TimingStudy:
+    """Run the repeatability study on sweeps without an acceleration: by what the tap does to the EMG (3.3.3)."""
+    return _study(name, sweeps, commanded_isi_ms, _events_in_emg, EMG_DELAY_MS[1])
+
+
+def _events_in_emg(sweep: Sweep) -> TapEvents:
+    """The impact that the EMG shows, on the sweep's clock."""
+    emg, pulse_ms, unknown = sweep.channels["emg"], sweep.t_tms_ms, np.full(1, np.nan)
+    pulses = None if pulse_ms is None else [pulse_ms - emg.t0_ms]
+    valve_ms = (sweep.t_valve_ms or 0.0) - emg.t0_ms
+    hit_ms = impact_times_in_emg(emg.values, emg.rate_hz, valve_ms=valve_ms, t_tms_ms=pulses) + emg.t0_ms
+    return TapEvents(unknown, unknown, hit_ms, unknown, hit_ms + EMG_DELAY_MS[0])
+
+
+def _study(
+    name: str,
+    sweeps: Iterable[Sweep],
+    commanded_isi_ms: Iterable[float | None],
+    events_of: Callable[[Sweep], TapEvents],
+    hit_sd_ms: float = 0.0,
+) -> TimingStudy:
     parts, realised = [], []
     for sweep in sweeps:
-        events = sweep_events(sweep)  # raises if the valve's time is unknown
+        events, shift_ms = events_of(sweep), VALVE_MS - (sweep.t_valve_ms or 0.0)
         realised.append(np.nan if sweep.t_tms_ms is None else sweep.t_tms_ms - events.hit_ms[0])
-        shift_ms = VALVE_MS - (sweep.t_valve_ms or 0.0)
         parts.append(TapEvents(*(times_ms + shift_ms for times_ms in events.columns().values())))
     if not parts:
         raise InvalidValueError(
@@ -250,23 +266,7 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
     commanded = np.array([np.nan if isi is None else isi for isi in commanded_isi_ms])
     if len(commanded) != len(parts):
         raise InvalidValueError("each sweep has one commanded ISI", got=len(commanded), expected=str(len(parts)))
-    return TimingStudy(name, _joined(parts), commanded, np.array(realised))
-
-
-def study_emg(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[float | None]) -> TimingStudy:
-    """Run the repeatability study on sweeps without an acceleration: by what the tap does to the EMG (3.3.3)."""
-    parts, realised = [], []
-    for sweep in sweeps:
-        emg, valve_ms, pulse_ms = sweep.channels["emg"], sweep.t_valve_ms or 0.0, sweep.t_tms_ms
-        pulses = None if pulse_ms is None else [pulse_ms - emg.t0_ms]
-        (hit_ms,) = impact_times_in_emg(emg.values, emg.rate_hz, valve_ms=valve_ms - emg.t0_ms, t_tms_ms=pulses)
-        hit_ms += emg.t0_ms
-        realised.append(np.nan if pulse_ms is None else pulse_ms - hit_ms)
-        unknown, shift_ms = np.full(1, np.nan), VALVE_MS - valve_ms
-        seen_ms = np.array([hit_ms + EMG_DELAY_MS[0] + shift_ms])
-        parts.append(TapEvents(unknown, unknown, np.array([hit_ms + shift_ms]), unknown, seen_ms))
-    commanded = np.array([np.nan if isi is None else isi for isi in commanded_isi_ms])
-    return TimingStudy(name, _joined(parts), commanded, np.array(realised), EMG_DELAY_MS[1])
+    return TimingStudy(name, _joined(parts), commanded, np.array(realised), hit_sd_ms)
 
 
 def study_session(record: SessionRecord) -> TimingStudy:

@@ -27,10 +27,7 @@ EMG: Final = "emg"
 _EVENT_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "onset": ("s", "when it was, in the file"),
     "duration": ("s", "how long it lasted; 0 for a moment"),
-    "trial_type": (
-        "",
-        "sweep: a trial's waveforms; and in it {valve}{0.name}: the {0.moment}, tms: the {0.pulse}",
-    ),
+    "trial_type": ("", "sweep: a trial's waveforms; and in it {valve}{0.name}: the {0.moment}, tms: the {0.pulse}"),
     "trial": ("", "the number of the trial"),
     "condition": ("", "paired, TMS alone or {0.alone}; unknown if its record is lost"),
     "commanded_isi_ms": ("ms", "the commanded ISI; none for a control trial"),

@@ -1,9 +1,9 @@
-"""What comes next in an intervention: from its plan, its arm, and what is known of the window."""
+"""What comes next in an intervention: from its plan, its arm, and what is known of the window; and how that went."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -30,10 +30,7 @@ OUTSIDE: Final = 0.1
 class Agenda:
     """The agenda of one intervention. What comes next depends on plan, seed, and the trials before it alone.
 
-    Args:
-        intervention: the plan and the sealed arm.
-        strategy: knows the window, from the trials before the intervention.
-        seed: the session's, which draws intervals and the places of probes.
+    The strategy knows the window from the trials before; the session's seed draws intervals and the places of probes.
 
     Raises:
         InvalidValueError: no window was found, or the plan's range holds none of its ISIs.
@@ -103,11 +100,7 @@ class Agenda:
         return slot is not None and schedule.rests_before_slot(slot)
 
     def isi_ms(self, trials: Iterable[Trial]) -> float:
-        """The ISI of the next pair [ms]; the same for the same trials.
-
-        Args:
-            trials: all before it, as they count now.
-        """
+        """The ISI of the next pair [ms], after all trials before it as they count now; the same for the same trials."""
         trials = tuple(trials)
         slot = self._slots[len(trials)]
         if self.plan.probes or self.plan.follow_ms:
@@ -119,11 +112,7 @@ class Agenda:
         return self._space.snap(_turn(self._used_ms(), slot.place))
 
     def followed(self, trials: Iterable[Trial]) -> Followed:
-        """What is known of the window after some trials.
-
-        Args:
-            trials: all so far, as they count now.
-        """
+        """What is known of the window after all trials so far, as they count now."""
         self._learn(tuple(trials))
         return self._followed
 
@@ -146,8 +135,7 @@ class Agenda:
         wanted = self._wanted(self._followed)
         centre = _centre(wanted)
         near = min(max(centre, self._centre_ms - self.plan.follow_ms), self._centre_ms + self.plan.follow_ms)
-        moved: FloatArray = np.clip(wanted + (near - centre), self._allowed_ms[0], self._allowed_ms[-1])
-        return moved
+        return np.clip(wanted + (near - centre), self._allowed_ms[0], self._allowed_ms[-1])
 
     def _wanted(self, followed: Followed) -> FloatArray:
         """ISIs of pairs, were there no bound [ms]: that of the largest enhancement, or those of the window."""
@@ -155,6 +143,38 @@ class Agenda:
         best = int(np.argmax(np.where(allowed, followed.enhancement_mv, -np.inf)))
         inside = followed.isi_ms[allowed & (followed.p_inside >= INSIDE)]
         return inside if self.plan.over_window and inside.size else followed.isi_ms[[best]]
+
+
+class FollowedPair(NamedTuple):
+    """A pair, and what was known of the window when it was asked for."""
+
+    number: int
+    """Its number among the pairs, from 1 on."""
+    block: int
+    isi_ms: float
+    probe: bool
+    best_ms: float
+    """The ISI of the largest enhancement: its median [ms], and the ends of its 90 % interval."""
+    low_ms: float
+    high_ms: float
+    p_inside: float
+    """The probability that the pair was inside the window."""
+
+
+def course_of(agenda: Agenda, trials: Iterable[Trial], seed: int) -> tuple[FollowedPair, ...]:
+    """What was known at each pair that was delivered, from all trials of the intervention so far."""
+    before: list[Trial] = []
+    pairs = []
+    for trial in trials:
+        slot = agenda.slot(trial.index)
+        if slot is not None and slot.part is Part.PAIRS and trial.wanted_isi_ms is not None:
+            followed = agenda.followed(before)
+            inside = float(np.interp(trial.wanted_isi_ms, followed.isi_ms, followed.p_inside))
+            probe = schedule.is_probe(agenda.plan, slot, seed)
+            at = slot.place + 1, slot.block, trial.wanted_isi_ms, probe
+            pairs.append(FollowedPair(*at, *followed.best_ms(), inside))
+        before.append(trial)
+    return tuple(pairs)
 
 
 def _turn(isis_ms: FloatArray, place: int) -> float:

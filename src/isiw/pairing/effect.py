@@ -19,8 +19,7 @@ from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
 from isiw.pairing.law import Pulses
 from isiw.pairing.level import STRETCH, LevelPrior, Posterior, Stretches, posterior
-from isiw.pairing.pulses import TestPulse
-from isiw.types import FloatArray
+from isiw.pairing.pulses import TestPulse, meps_mv
 
 ALL_BLOCKS: Final = "all blocks"
 """The name of the mean over the blocks after an intervention."""
@@ -189,7 +188,7 @@ def _ratio(before: Sequence[TestPulse], after: Sequence[TestPulse]) -> tuple[flo
     """Ratio of mean MEPs at the same intensities, and the SD of its log if nothing changed, by the pulses before."""
     logs, variances, weights = [], [], []
     for pct in sorted({pulse.intensity_pct_rmt for pulse in after}):
-        first, then = (_meps_mv(those, pct) for those in (before, after))
+        first, then = (meps_mv(those, pct) for those in (before, after))
         if len(first) < 2 or not first.mean() > 0 or not then.mean() > 0:
             continue
         logs.append(math.log(then.mean() / first.mean()))
@@ -199,7 +198,3 @@ def _ratio(before: Sequence[TestPulse], after: Sequence[TestPulse]) -> tuple[flo
         return None, None
     shares = np.array(weights) / sum(weights)
     return math.exp(float(shares @ np.array(logs))), math.sqrt(float(shares**2 @ np.array(variances)))
-
-
-def _meps_mv(pulses: Sequence[TestPulse], pct: float) -> FloatArray:
-    return np.array([pulse.mep_mv for pulse in pulses if pulse.intensity_pct_rmt == pct])

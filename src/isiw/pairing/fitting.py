@@ -18,11 +18,7 @@ _ROUNDING_S: Final = 1e-6
 def require_possible(plan: Plan, limits: Limits, given_before: int, seed: int) -> None:
     """Raise if limits do not allow a plan: its number of stimuli, its ISIs, or one of its times.
 
-    Args:
-        plan: the plan.
-        limits: the limits of the session.
-        given_before: stimuli of the visit that were given before.
-        seed: the session's, which draws the intervals.
+    The stimuli of the visit that were given before count; the session's seed draws the intervals.
 
     Raises:
         InvalidValueError: more stimuli than the limits allow, a range of ISIs beyond theirs, an interval or a rest that
@@ -53,11 +49,7 @@ def require_possible(plan: Plan, limits: Limits, given_before: int, seed: int) -
 def require_settable(plan: Plan, limits: Limits, device: DeviceInfo, *, searched_several: bool = False) -> None:
     """Raise if a device cannot give what a plan has: an arm, or intensities, which limits may exclude, too.
 
-    Args:
-        plan: the plan.
-        limits: the limits of the session.
-        device: the description of its device.
-        searched_several: whether the device was told an intensity for each pulse of the search.
+    Intensities are excluded as well where the search was one of several, each of which the device set itself.
 
     Raises:
         InvalidValueError: an arm of taps alone, whichever is drawn, at a device that gives none; several intensities at

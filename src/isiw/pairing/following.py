@@ -83,8 +83,7 @@ class Movement(Checked):
     def changing(self) -> FloatArray:
         """The same of shares and levels together."""
         shares, levels = _steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling)
-        both: FloatArray = np.kron(shares, levels).astype(float)
-        return both
+        return np.kron(shares, levels).astype(float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,13 +112,7 @@ class Followed:
     def begin(
         cls, posterior: Posterior, space: DesignSpace, earlier: Sequence[Trial], movement: Movement | None = None
     ) -> Followed:
-        """What is known before the first pair.
-
-        Args:
-            posterior: the posterior of the search for the window.
-            space: its ISIs.
-            earlier: its trials, which say how much MEPs vary.
-            movement: what changes from pair to pair.
+        """What is known before the first pair, from a search's posterior, and its trials for how much MEPs vary.
 
         Raises:
             StrategyError: a posterior that samples neither profiles nor windows.
@@ -180,8 +173,7 @@ class Followed:
         """SD of MEPs about their expectation, natural log: the larger, the more of them is enhancement."""
         base = self.baseline_mv[:, None, None]
         share = np.clip(1.0 - base / expected_mv, 0.0, 1.0)
-        spread: FloatArray = np.hypot((1.0 - share) * _ALONE_LOG_SD, share * self.log_sd)
-        return spread
+        return np.hypot((1.0 - share) * _ALONE_LOG_SD, share * self.log_sd)
 
     def _at(self, values: FloatArray, isi_ms: float) -> FloatArray:
         """Values at an ISI between those at which they are known, (s, shifts)."""
@@ -197,15 +189,13 @@ class Followed:
     @cached_property
     def _placed(self) -> FloatArray:
         """Weights of profiles, shifts and shares, (s, shifts, shares)."""
-        placed: FloatArray = self.weights.sum((0, -1))
-        return placed
+        return self.weights.sum((0, -1))
 
     @cached_property
     def enhancement_mv(self) -> FloatArray:
         """The expected enhancement at each ISI [mV], shape (t,)."""
         left = self._placed @ SHARES
-        mean: FloatArray = _mean(left, self.profiles_mv) - float(left.sum(-1) @ self.baseline_mv)
-        return mean
+        return _mean(left, self.profiles_mv) - float(left.sum(-1) @ self.baseline_mv)
 
     @cached_property
     def p_inside(self) -> FloatArray:
@@ -234,17 +224,14 @@ class Followed:
 
 
 def _interval(values: FloatArray, weights: FloatArray, level: float) -> tuple[float, float, float]:
-    order = np.argsort(values)
-    summed = np.cumsum(weights[order])
-    picks = [int(np.searchsorted(summed, share)) for share in (0.5, (1 - level) / 2, (1 + level) / 2)]
-    median, low, high = (float(values[order][min(pick, len(values) - 1)]) for pick in picks)
+    shares = (0.5, (1 - level) / 2, (1 + level) / 2)
+    median, low, high = np.quantile(values, shares, weights=weights, method="inverted_cdf").tolist()
     return median, low, high
 
 
 def _mean(weights: FloatArray, values: FloatArray) -> FloatArray:
     """The mean of values (..., t) over all but the last axis, shape (t,)."""
-    mean: FloatArray = weights.ravel() @ values.reshape(weights.size, -1)
-    return mean
+    return weights.ravel() @ values.reshape(weights.size, -1)
 
 
 def _shifted(values: FloatArray, isi_ms: FloatArray) -> FloatArray:

@@ -52,9 +52,7 @@ class Scores(NamedTuple):
 def scores(pulses: Pulses, latents: FloatArray) -> Scores:
     """Log densities of log MEPs, or log probabilities of those below the limit, with their derivatives.
 
-    Args:
-        pulses: n pulses.
-        latents: those of each pulse, in the order of `LATENTS`, (n, 7).
+    Latents are those of each of the n pulses, in the order of `LATENTS`, shape (n, 7).
     """
     log_floor, floor_sd, x50, log_slope, input_sd, output_sd, level = latents.T[:, :, None]
     slope = np.exp(log_slope)
@@ -126,5 +124,4 @@ def curvatures(pulses: Pulses, latents: FloatArray) -> FloatArray:
     )
     gradient = scores(again, moved.reshape(-1, number)).gradient.reshape(2, number, n, number)
     found = np.moveaxis((gradient[0] - gradient[1]) / (2.0 * _STEPS[:, None, None]), 0, 1)
-    both: FloatArray = 0.5 * (found + np.swapaxes(found, 1, 2))
-    return both
+    return 0.5 * (found + np.swapaxes(found, 1, 2))

@@ -141,8 +141,7 @@ def _kept(persistence: float, at: FloatArray) -> FloatArray:
     nodes = np.linspace(0.0, 1.0, 5)
     places = at[:, :1] + nodes * (at[:, 1:] - at[:, :1])
     apart = np.abs(places[:, None, :, None] - places[None, :, None, :])
-    kept: FloatArray = (persistence**apart).mean(axis=(2, 3))
-    return kept
+    return (persistence**apart).mean(axis=(2, 3))
 
 
 class _Quadratic(NamedTuple):
@@ -159,13 +158,7 @@ class _Quadratic(NamedTuple):
 
 
 def posterior(pulses: Pulses, stretches: Stretches, prior: LevelPrior) -> Posterior:
-    """The posterior of the changes.
-
-    Args:
-        pulses: n pulses of one person.
-        stretches: which of them have one level.
-        prior: what is known beforehand.
-    """
+    """The posterior of the changes from one person's pulses."""
     laws = [_level_law(prior, stretches, size) for size, _ in prior.drifts]
     centre = np.concatenate((prior.curve[0], np.full(len(stretches.block), prior.largest_mv.log_law[0])))
     likelihood = _Likelihood(pulses, stretches, len(centre))

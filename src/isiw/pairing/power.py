@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from typing import Final
 
-from isiw.checks import number, share, whole
+from isiw.checks import number, share
 from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
 from isiw.pairing.effect import AfterEffect
@@ -16,7 +17,8 @@ POWER: Final = 0.8
 BETWEEN_PEOPLE: Final = 0.35
 """SD of the change between people, natural log: an assumption, which a pilot study replaces."""
 
-_MOST_PEOPLE: Final = 10_000
+_LEAST_PEOPLE: Final = 2
+_PEOPLE: Final = range(_LEAST_PEOPLE, 10_000)
 
 
 def pulses_needed(effect: AfterEffect, factor: float, *, power: float = POWER, steady: bool = False) -> int | None:
@@ -60,11 +62,7 @@ def people_needed(factor: float, log_sd: float, *, power: float = POWER, level: 
     size = _log_of(factor) / number("log_sd", log_sd, above=0)
     power = share("the power", power, above=0.0, below=1.0)
     level = share("the level", level, above=0.0, below=1.0)
-    few, many = 2, _MOST_PEOPLE
-    while few < many:
-        middle = (few + many) // 2
-        few, many = (few, middle) if _power(middle, size, level) >= power else (middle + 1, many)
-    return whole("the number of people", few, least=2)
+    return _LEAST_PEOPLE + bisect_left(_PEOPLE, power, key=lambda people: _power(people, size, level))
 
 
 def measuring_log_sd(effect: AfterEffect) -> float:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
+
+import numpy as np
 
 from isiw import schedule
 from isiw.checks import Amplitude, Checked, Number, Positive, Text
@@ -11,6 +14,7 @@ from isiw.intervention import Arm, Plan
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.record import SessionRecord
 from isiw.schedule import Part
+from isiw.types import FloatArray
 
 USUAL_PCT_RMT: Final = 110.0
 """The intensity of a visit that nobody has stated [% RMT]."""
@@ -36,6 +40,11 @@ class TestPulse(Checked):
     intensity_pct_rmt: Positive
     after_last_pair_s: Number
     block: Text
+
+
+def meps_mv(pulses: Iterable[TestPulse], pct_rmt: float) -> FloatArray:
+    """The amplitudes of the pulses of one intensity [mV], in their order."""
+    return np.array([pulse.mep_mv for pulse in pulses if pulse.intensity_pct_rmt == pct_rmt])
 
 
 @dataclass(frozen=True)

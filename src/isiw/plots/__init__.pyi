@@ -5,5 +5,5 @@ from .comparison import study_figure as study_figure
 from .session import save_session_plot as save_session_plot
 from .session import session_figure as session_figure
 from .style import save_figure as save_figure
-from .sweeps import sweeps_figure as sweeps_figure
+from .timeline import sweeps_figure as sweeps_figure
 from .timeline import timing_figure as timing_figure

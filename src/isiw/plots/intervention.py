@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from isiw.pairing.course import FollowedPair
+from isiw.pairing.agenda import FollowedPair
 from isiw.pairing.effect import AfterEffect, BlockChange
-from isiw.pairing.pulses import Delivered, TestPulse
+from isiw.pairing.pulses import Delivered, TestPulse, meps_mv
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, explain, saying, tidied
 from isiw.types import FloatArray
 
@@ -22,12 +22,7 @@ _LEAST_UV: Final = 1.0
 
 
 def change_figure(effect: AfterEffect, pulses: Sequence[TestPulse]) -> Figure:
-    """TMS alone before and after: each pulse, the mean of each block, and where it would be without an effect.
-
-    Args:
-        effect: what `isiw.pairing.change_of` says of the pulses.
-        pulses: of TMS alone, in the order of delivery.
-    """
+    """TMS alone before and after: each pulse, the mean of each block, and where it would be without an effect."""
     blocks = _by_block(effect, pulses)
     figure = Figure(figsize=(8.4, 4.4), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.0 + 0.35 * len(blocks), 1.8))
@@ -51,9 +46,9 @@ def _draw_pulses(axes: Axes, effect: AfterEffect, blocks: Mapping[str, Sequence[
     for number, pct in enumerate(levels):
         colour = _COLOURS[number % len(_COLOURS)]
         beside = 0.0 if len(levels) == 1 else 0.5 * (number / (len(levels) - 1) - 0.5)
-        before_uv = _meps_uv(blocks["before"], pct)
+        before_uv = 1e3 * meps_mv(blocks["before"], pct)
         for place, those in enumerate(blocks.values()):
-            meps_uv = _meps_uv(those, pct)
+            meps_uv = 1e3 * meps_mv(those, pct)
             if not len(meps_uv):
                 continue
             at = place + beside + 0.09 * _spread(len(meps_uv))
@@ -105,9 +100,7 @@ def _draw_changes(axes: Axes, effect: AfterEffect) -> None:
 def dose_figure(delivered: Sequence[Delivered], window: Sequence[tuple[float, float, float]] = ()) -> Figure:
     """The pairs of an intervention: at which ISIs, and when; and where the window was.
 
-    Args:
-        delivered: in the order of delivery.
-        window: at some times [s from the first pair] where the window starts and ends [ms].
+    The window is where it starts and ends [ms] at some times [s from the first pair].
     """
     figure = Figure(figsize=(8.4, 2.9), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.7), sharey=True)
@@ -138,11 +131,7 @@ def dose_figure(delivered: Sequence[Delivered], window: Sequence[tuple[float, fl
 
 
 def course_figure(course: Sequence[FollowedPair]) -> Figure:
-    """The window that was followed: the best ISI with its interval, each pair, and how many of a block were inside.
-
-    Args:
-        course: what was known at each pair, in the order of delivery.
-    """
+    """The window that was followed: the best ISI with its interval, each pair, and how many of a block were inside."""
     figure = Figure(figsize=(8.4, 3.4), layout="constrained")
     above, below = figure.subplots(2, 1, height_ratios=(2.4, 1.0), sharex=True)
     tidied(above, below)
@@ -168,10 +157,6 @@ def course_figure(course: Sequence[FollowedPair]) -> Figure:
     below.set(xlabel="pair", ylabel="pairs")
     explain(figure, ncols=3)
     return figure
-
-
-def _meps_uv(pulses: Sequence[TestPulse], pct: float) -> FloatArray:
-    return np.array([1e3 * pulse.mep_mv for pulse in pulses if pulse.intensity_pct_rmt == pct])
 
 
 def _spread(number: int) -> FloatArray:

@@ -102,8 +102,8 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
 
 def _draw_window(axes: Axes, estimate: EstimateRecord | None, truth: Window | None) -> None:
     segments = estimate.window.segments if estimate and estimate.window else ()
-    for number, (start, end) in enumerate(segments):
-        axes.axvspan(start, end, color=BLUE, alpha=0.10, lw=0, label="window" if number == 0 else None)
+    for start, end in segments:
+        axes.axvspan(start, end, color=BLUE, alpha=0.10, lw=0, label="window")
     if estimate and segments:
         space = (min(estimate.grid_ms, default=segments[0][0]), max(estimate.grid_ms, default=segments[-1][1]))
         for height, (_, colour, pair) in zip((1.02, 1.0), edge_intervals(estimate, *space), strict=False):
@@ -111,8 +111,8 @@ def _draw_window(axes: Axes, estimate: EstimateRecord | None, truth: Window | No
                 pair, (height, height), color=colour, lw=4, solid_capstyle="butt",
                 transform=axes.get_xaxis_transform(), clip_on=False, in_layout=False,
             )  # fmt: skip
-    for number, edge in enumerate(itertools.chain(*(truth.segments if truth else ()))):
-        axes.axvline(edge, color=INK, lw=1, ls=(0, (4, 3)), label="true window (simulated)" if number == 0 else None)
+    for edge in itertools.chain(*(truth.segments if truth else ())):
+        axes.axvline(edge, color=INK, lw=1, ls=(0, (4, 3)), label="true window (simulated)")
 
 
 def _draw_profile(axes: Axes, estimate: EstimateRecord | None) -> None:

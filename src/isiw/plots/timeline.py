@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,19 +16,7 @@ from matplotlib.ticker import MaxNLocator
 
 from isiw.figures import Estimate
 from isiw.log.record import SessionRecord
-from isiw.plots.style import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    ORANGE,
-    RED,
-    TRIAL_AXIS,
-    edge_intervals,
-    explain,
-    saying,
-    tidied,
-)
+from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, TRIAL_AXIS, edge_intervals, explain, saying, tidied
 from isiw.signals.impact import VALVE_MS
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.sweeps import Channel
@@ -77,8 +66,8 @@ def _other_event(record: SessionRecord) -> dict[str, float]:
 
 def _draw_window(axes: Axes, estimate: Estimate, span_ms: tuple[float, float]) -> None:
     segments = estimate.window.segments if estimate.window else ()
-    for number, (start, end) in enumerate(segments):
-        axes.axvspan(start, end, ymin=0.1, ymax=0.62, color=BLUE, alpha=0.3, lw=0, label=None if number else "window")
+    for start, end in segments:
+        axes.axvspan(start, end, ymin=0.1, ymax=0.62, color=BLUE, alpha=0.3, lw=0, label="window")
     for height, (name, colour, pair) in zip((0.47, 0.34), edge_intervals(estimate, *span_ms), strict=False):
         if segments:
             label = f"90 % interval of its {name}"
@@ -193,7 +182,7 @@ class _Trace(NamedTuple):
     emg_mv: FloatArray
 
 
-def sweeps_figure(record: SessionRecord) -> Figure | None:
+def all_sweeps_figure(record: SessionRecord) -> Figure | None:
     """The EMG of all trials that count, a row a trial, ISIs ascending, TMS alone lowest."""
     found = (_trace(trial, record.waveforms.get((trial.index, "emg"))) for trial in record.table.told)
     placed = [(trace.trial.isi_ms, trace) for trace in found if trace is not None]
@@ -282,3 +271,46 @@ def _finish(axes: Axes, traces: Sequence[_Trace]) -> None:
     room = _rows_of_largest(traces)
     axes.set(xlim=(-BEFORE_MS, AFTER_MS), ylim=(-room, len(traces) - 1 + room))
     axes.set(xlabel="time after the TMS pulse [ms]", ylabel="ISI [ms]")
+
+
+def sweeps_figure(
+    trials: Iterable[Trial], sweeps: Mapping[int, Mapping[str, Channel]], mep_window_ms: tuple[float, float], most: int
+) -> Figure | None:
+    """Draw the EMG of the first trials that have any, about the pulse.
+
+    Args:
+        trials: the trials.
+        sweeps: their waveforms, by trial and channel; the EMG is in mV.
+        mep_window_ms: where the MEP is sought [ms after the pulse].
+        most: how many are drawn.
+    """
+    chosen = list(islice((one for one in trials if "emg" in sweeps.get(one.index, {})), most))
+    chosen = [one for one in chosen if one.t_tms_ms is not None]
+    if not chosen:
+        return None
+    figure = Figure(figsize=(7.5, 2.0 * len(chosen) + 0.6), layout="constrained")
+    panels = figure.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, trial in zip(panels, chosen, strict=True):
+        _draw_sweep(axes, trial, sweeps[trial.index]["emg"], mep_window_ms)
+    panels[-1].set_xlabel("time after the pulse [ms]")
+    tidied(*panels)
+    return figure
+
+
+def _draw_sweep(axes: Axes, trial: Trial, emg: Channel, window_ms: tuple[float, float]) -> None:
+    pulse_ms = trial.t_tms_ms or 0.0
+    times_ms = emg.t0_ms - pulse_ms + 1e3 * np.arange(len(emg.values)) / emg.rate_hz
+    axes.axvspan(*window_ms, color=BLUE, alpha=0.15, lw=0)
+    axes.axvline(0.0, color=RED, lw=1)
+    if (tap_ms := trial.t_hit_ms if trial.t_hit_ms is not None else trial.t_valve_ms) is not None:
+        axes.axvline(tap_ms - pulse_ms, color=FAINT, lw=1)
+    axes.plot(times_ms, emg.values, color=INK, lw=0.8)
+    inside = np.flatnonzero((times_ms >= window_ms[0]) & (times_ms <= window_ms[1]))
+    if len(inside):
+        ends = inside[[emg.values[inside].argmin(), emg.values[inside].argmax()]]
+        axes.plot(times_ms[ends], emg.values[ends], "o", color=BLUE, ms=4)
+    isi = "TMS alone" if trial.isi_ms is None else f"ISI {trial.isi_ms:.4g} ms"
+    mep = "no MEP" if trial.mep_mv is None else f"MEP {1e3 * trial.mep_mv:.3g} µV"
+    lost = "" if trial.told else f"; does not count: {trial.reason or 'excluded'}"
+    axes.set_title(f"trial {trial.index}: {isi}, {mep}{lost}", fontsize="small", loc="left")
+    axes.set_ylabel("EMG [mV]")

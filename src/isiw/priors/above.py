@@ -43,11 +43,7 @@ _HALF_MS: Final = 0.5
 """A normal law of starts is a span that is hardly one [ms]."""
 
 
-def above(
-    *records: SessionRecord,
-    prior: Prior | None = None,
-    law: DayToDay | None = None,
-) -> SupraPrior:
+def above(*records: SessionRecord, prior: Prior | None = None, law: DayToDay | None = None) -> SupraPrior:
     """The prior of a search above the motor threshold after sessions below it, for the strategy `supra-threshold`.
 
     Args:

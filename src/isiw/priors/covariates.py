@@ -64,13 +64,9 @@ class Slope(Checked):
 
 
 def slopes_of(visits: Sequence[Visit], block: LatentBlock, law: Law, rng: np.random.Generator) -> tuple[Slope, ...]:
-    """How the starts of a lab's people go with the covariates that enough of them state.
+    """How the starts of a lab's n people go with the covariates that enough of them state.
 
-    Args:
-        visits: what is noted of each person, n of them.
-        block: start and log width of their particles, (n, i, 2).
-        law: of start and log width in the lab.
-        rng: draws correlations.
+    Block and law are of start and log width, of their particles, (n, i, 2), and of the lab.
     """
     names, z, scales = _standardised(visits)
     if not names:
@@ -111,18 +107,11 @@ def _log_likelihoods(block: LatentBlock, row: int, law: Law, shift: FloatArray, 
     log_law = -0.5 * (about**2 + z[:, 1:] ** 2) - np.log(left) - np.log(law.sd).sum() - np.log(2 * np.pi)
     ratio = log_law - block.log_density[row][:, None] + math.log(1 - P_OUTSIDER)
     weight = np.where(block.used[row][:, None], np.logaddexp(math.log(P_OUTSIDER), ratio), 0.0)
-    found: FloatArray = np.logaddexp.reduce(weight, axis=0)
-    return found
+    return np.logaddexp.reduce(weight, axis=0)
 
 
 def expected(place: Place, slopes: Sequence[Slope], visit: Visit) -> Place:
-    """The law of the next person's window, of whom something is noted.
-
-    Args:
-        place: that of the lab's people.
-        slopes: how starts go with covariates.
-        visit: what is noted of the person; what is not, changes nothing.
-    """
+    """The law of the next person's window, of whom something is noted; what is not noted changes nothing."""
     mean_ms, sd_ms = place.start_ms.law
     left = 1.0
     error_ms2 = 0.0

@@ -179,8 +179,7 @@ def _log_ratio(block: LatentBlock, law: _Normal) -> FloatArray:
     mean, sd = law
     z = (block.values - mean) / sd
     log_law = -0.5 * (z**2).sum(-1) - np.log(sd).sum() - 0.5 * np.log(2 * np.pi) * len(mean)
-    ratio: FloatArray = log_law - block.log_density + np.log(1 - P_OUTSIDER)
-    return ratio
+    return log_law - block.log_density + np.log(1 - P_OUTSIDER)
 
 
 def _picked(
@@ -199,8 +198,7 @@ def _picked(
     for name, kinds in people.kinds.items():
         log_share = np.append(np.log(shares[name] / usual[name]), 0.0)
         log_weight = log_weight + log_share[kinds]
-    picks: IntArray = (log_weight + rng.gumbel(size=np.shape(log_weight))).argmax(-1)
-    return picks
+    return (log_weight + rng.gumbel(size=np.shape(log_weight))).argmax(-1)
 
 
 def _members(block: LatentBlock, law: _Normal, picks: IntArray, rng: np.random.Generator) -> FloatArray:
@@ -208,8 +206,7 @@ def _members(block: LatentBlock, law: _Normal, picks: IntArray, rng: np.random.G
     rows = np.arange(len(picks))
     log_odds = _log_ratio(block, law)[rows, picks] - np.log(P_OUTSIDER)
     inside = block.used[rows, picks] & (rng.logistic(size=len(picks)) < log_odds)
-    members: FloatArray = block.values[rows, picks][inside]
-    return members
+    return block.values[rows, picks][inside]
 
 
 def _drawn_law(members: FloatArray, law: _Normal, hyper: HyperPrior, rng: np.random.Generator) -> _Normal:
@@ -265,8 +262,7 @@ def _person(posterior: ParticlePosterior) -> tuple[dict[str, LatentBlock], dict[
 def drawn_from(prior: Prior, space: DesignSpace, size: int) -> FloatArray:
     """Latents of so many people in general, shape (size, d)."""
     values, _ = law_of(prior, space).draws(size, np.zeros(1, dtype=np.uint64))
-    drawn: FloatArray = values[0].astype(float)
-    return drawn
+    return values[0].astype(float)
 
 
 def hyper_prior(prior: Prior, space: DesignSpace) -> dict[str, HyperPrior]:

@@ -64,20 +64,17 @@ def _timing(record: SessionRecord) -> Answer:
     question, space = "Was the timing right?", record.header.space
     errors_ms = [abs(trial.isi_error_ms) for trial in record.table.told if trial.isi_error_ms is not None]
     rejected = _rejected_for(record, _OF_TIMING)
+    unknown = _verdict(record, len(rejected), 0)
     if not errors_ms:
-        return Answer(
-            question,
-            _verdict(record, len(rejected), 0),
-            f"No trial that counts has a realised ISI. {_listed(rejected)}",
-        )
+        return Answer(question, unknown, f"No trial that counts has a realised ISI. {_listed(rejected)}")
     if record.header.imported and max(errors_ms) < _ROUNDING_MS:
         detail = "No ISI was commanded that the realised one could be compared with: the file says none."
-        return Answer(question, _verdict(record, len(rejected), 0), f"{detail} {_listed(rejected)}")
+        return Answer(question, unknown, f"{detail} {_listed(rejected)}")
     confirmed = [timed_isi_ms(trial, space) is not None for trial in record.table]
     if not any(errors_ms) and not any(confirmed):
         times = f"{record.header.stimulus.pulse} or {record.header.stimulus.hit} time"
         detail = f"The device reports every ISI exactly as commanded, and no {times} to check it against."
-        answer = _verdict(record, len(rejected), 0) if rejected else "not known: exactly 0 off in all trials"
+        answer = unknown if rejected else "not known: exactly 0 off in all trials"
         return Answer(question, answer, f"{detail} {_listed(rejected)}")
     tolerance_ms = record.header.signals.tolerance_ms(space)
     sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"

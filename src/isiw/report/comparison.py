@@ -19,7 +19,7 @@ from isiw.priors.days import DayToDay
 from isiw.priors.differing import Difference
 from isiw.report.html import rendered, write_page
 from isiw.report.tables import first_facts
-from isiw.report.words import counts_sentence, finding_sentences
+from isiw.report.words import counts_sentence, findings
 from isiw.text.sanitize import one_line
 
 HEADINGS = ("session", "subject", "begun", "trials", "P(window)", "window", "start", "end")
@@ -121,11 +121,7 @@ def _whose(record: SessionRecord) -> str:
 
 
 def save_comparison(
-    records: Sequence[SessionRecord],
-    differences: Sequence[Difference],
-    path: str | Path,
-    *,
-    overwrite: bool = False,
+    records: Sequence[SessionRecord], differences: Sequence[Difference], path: str | Path, *, overwrite: bool = False
 ) -> Path:
     """Write a page that compares sessions into a file.
 
@@ -155,7 +151,10 @@ def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Diff
             {
                 "subject": record.header.subject or "an unnamed subject",
                 "log": record.path.name,
-                "findings": [*finding_sentences(record), *([summary.JUDGED_SINCE] if record.is_judged_since else [])],
+                "findings": [
+                    *(one.text for one in findings(record)),
+                    *([summary.JUDGED_SINCE] if record.is_judged_since else []),
+                ],
                 "counts": counts_sentence(record),
                 "facts": first_facts(record),
             }

@@ -14,7 +14,6 @@ from isiw.files import check_output, write_output
 from isiw.text.named_code import library
 from isiw.text.sanitize import plain
 
-_ASSETS: Final = resources.files("isiw.report") / "assets"
 _SUFFIXES: Final = {".html", ".htm"}
 
 
@@ -40,14 +39,11 @@ def rendered(template: str, scripts: Sequence[str] = (), **contents: Any) -> str
     digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     hashes = [f"'sha256-{digest}'" for digest in digests]  # what the page's policy knows a script by
     page: str = environment.get_template(template).render(
-        contents,
-        style=asset("page.css"),
-        scripts=scripts,
-        hashes=" ".join(hashes) or "'none'",
+        contents, style=asset("page.css"), scripts=scripts, hashes=" ".join(hashes) or "'none'"
     )
     return page
 
 
-def asset(name: str) -> str:
-    """A file of `assets`."""
-    return (_ASSETS / name).read_text(encoding="utf-8")
+def asset(name: str, room: str = "isiw.report") -> str:
+    """A file of a room's `assets`."""
+    return (resources.files(room) / "assets" / name).read_text(encoding="utf-8")

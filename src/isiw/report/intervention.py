@@ -12,8 +12,7 @@ from isiw.errors import InvalidValueError, IsiwError
 from isiw.intervention import Arm, Plan
 from isiw.log.record import SessionRecord
 from isiw.pairing import words
-from isiw.pairing.agenda import Agenda
-from isiw.pairing.course import FollowedPair, course_of
+from isiw.pairing.agenda import Agenda, FollowedPair, course_of
 from isiw.pairing.effect import AfterEffect, BlockChange, change_of
 from isiw.pairing.pulses import Delivered, TestPulse, pairing_of
 from isiw.plots.intervention import change_figure, course_figure, dose_figure
@@ -78,15 +77,7 @@ class InterventionContents:
 
 
 def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> InterventionContents:
-    """What the log of an intervention says; of one whose arm is concealed nothing that would show it.
-
-    Args:
-        record: the log.
-        states: what a reader must know of it.
-
-    Raises:
-        LogError: the log is of no intervention.
-    """
+    """What the log of an intervention says; of one whose arm is concealed nothing that would show it."""
     pairing, intervention = pairing_of(record), record.header.intervention
     arm = "concealed" if record.conceals or intervention is None else intervention.arm.words
     plan, unfinished = pairing.plan, record.given < len(schedule.slots(pairing.plan))

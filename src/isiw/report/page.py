@@ -13,7 +13,7 @@ from isiw.log.frames import measures_of
 from isiw.log.record import SessionRecord, require_records
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
-from isiw.plots.timeline import course_figure, sweeps_figure, timeline_figure
+from isiw.plots.timeline import all_sweeps_figure, course_figure, timeline_figure
 from isiw.report.answers import answers, method_answers
 from isiw.report.drawn import drawn
 from isiw.report.html import asset, rendered, write_page
@@ -110,7 +110,7 @@ def _pictures(record: SessionRecord, truth: Window | None) -> Mapping[str, str]:
     figures = {
         "timeline": timeline_figure(record),
         "session": session_figure(record, truth=truth),
-        "sweeps": sweeps_figure(record),
+        "sweeps": all_sweeps_figure(record),
         "course": course_figure(record),
     }
     return {name: inline_svg(figure, name) for name, figure in figures.items() if figure is not None}

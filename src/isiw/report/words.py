@@ -236,11 +236,6 @@ def _first_step(record: SessionRecord) -> str:
     return f"The profile correlates with that {at} ({first.log}) by {r:.2f}, over {isis} ISIs."
 
 
-def finding_sentences(record: SessionRecord) -> list[str]:
-    """The same as words alone."""
-    return [one.text for one in findings(record)]
-
-
 def counts_sentence(record: SessionRecord) -> str:
     """The numbers of stimuli that were delivered and that count, and why the others do not."""
     said = counts((*record.table, *record.unknown_trials), record.header.stimulus)

@@ -16,7 +16,7 @@ from isiw.findings import Kind
 from isiw.session.state import State
 from isiw.summary import JUDGED_SINCE, summary
 from isiw.text.sanitize import plain
-from isiw.trials import Status, Trial
+from isiw.trials import Status, Stimulus, Trial, TrialTable
 
 _LONGEST_VALUE: Final = 200
 
@@ -142,6 +142,12 @@ class SessionAnswer(OkAnswer):
     stop: bool
     reason: str = Field(description="Why to stop, or to continue.")
     judged_since: bool = Field(default=False, description=_JUDGED_SINCE)
+
+    @classmethod
+    def of(cls, trials: TrialTable, asked: Stimulus | None, **stands: Any) -> Self:
+        """The answer about a session with these trials, one of which may be open."""
+        opened = {f"open_{name}": getattr(asked, name, None) for name in ("trial", "isi_ms", "intensity_pct_rmt")}
+        return cls(trials=len(trials), told=len(trials.told), **opened, **stands)
 
 
 class SessionEntry(BaseModel):

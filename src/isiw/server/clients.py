@@ -9,7 +9,7 @@ from isiw.log.schema import Event
 from isiw.server.answers import Refusal
 
 KEY: Final = r"^[A-Za-z0-9_-]{1,64}$"
-"""What a client may call itself; a random text, so that no other has it."""
+"""What a client may call itself, or something that it says; a random text, so that no other has it."""
 
 
 def logged_client(record: SessionRecord) -> str | None:

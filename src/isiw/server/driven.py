@@ -17,14 +17,7 @@ from isiw.log.record import SessionRecord
 from isiw.log.schema import Event
 from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, failed
 from isiw.server.clients import driven_from_here, given_once, logged_client, require_own
-from isiw.server.requests import (
-    AskRequest,
-    ExcludeRequest,
-    IncludeRequest,
-    MistrialRequest,
-    NoteRequest,
-    TellRequest,
-)
+from isiw.server.requests import AskRequest, ExcludeRequest, IncludeRequest, MistrialRequest, NoteRequest, TellRequest
 from isiw.session.recorder import Recorder
 from isiw.session.state import State, state_of
 from isiw.trials import Status, Trial
@@ -91,17 +84,14 @@ class DrivenSession:
 
     def stands(self) -> SessionAnswer:
         """The state of the session."""
-        asked, trials, decision = self.recorder.asked, self.recorder.trials, self.recorder.decision()
-        return SessionAnswer(
+        decision = self.recorder.decision()
+        return SessionAnswer.of(
+            self.recorder.trials,
+            self.recorder.asked,
             id=self.name,
             open=True,
             state=state_of(begun=True, running=True, paused=False, rests=self.recorder.rests, fault=False),
             subject=self.subject,
-            trials=len(trials),
-            told=len(trials.told),
-            open_trial=None if asked is None else asked.trial,
-            open_isi_ms=None if asked is None else asked.isi_ms,
-            open_intensity_pct_rmt=None if asked is None else asked.intensity_pct_rmt,
             wait_s=self.recorder.wait_s(),
             stop=decision.stop,
             reason=decision.reason,

@@ -50,11 +50,7 @@ class GivenPulses(_Request):
 
     @property
     def trials(self) -> tuple[Trial, ...]:
-        """The pulses as trials.
-
-        Raises:
-            InvalidValueError: not as many amplitudes as intensities, or values that cannot be.
-        """
+        """The pulses as trials."""
         if len(self.mep_mv) != len(self.intensity_pct_rmt):
             raise InvalidValueError(
                 "the pulses that were given before have an amplitude and an intensity each",
@@ -74,8 +70,7 @@ class CreateRequest(_Request):
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of the strategy.")
     visit: PersonsVisit = PersonsVisit()
     space: Space = Field(
-        default=VALVE_SPACE,
-        description="Without it, ISIs count from the valve command, from 0 to 500 ms.",
+        default=VALVE_SPACE, description="Without it, ISIs count from the valve command, from 0 to 500 ms."
     )
     strategy: StrategyConfig = StrategyConfig()
     limits: PulseLimits = PulseLimits()
@@ -166,16 +161,13 @@ class MistrialRequest(_Request):
     client: str | None = _CLIENT
 
 
-_KEY: Final = r"^[A-Za-z0-9_-]{1,64}$"
-
-
 class NoteRequest(_Request):
     """A remark for the log, or what changed."""
 
     text: Text
     key: str | None = Field(
         default=None,
-        pattern=_KEY,
+        pattern=KEY,
         description="Of the client's choice: the same note or change is logged once only, another is refused.",
     )
 
@@ -186,7 +178,7 @@ class IncludeRequest(_Request):
     trial: TrialNumber
     key: str | None = Field(
         default=None,
-        pattern=_KEY,
+        pattern=KEY,
         description="Of the client's choice: said again with it, it changes nothing, whatever was said since.",
     )
 

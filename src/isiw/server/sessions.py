@@ -226,8 +226,10 @@ def _planned(request: CreateRequest) -> str:
 
 def _stood(name: str, record: SessionRecord) -> SessionAnswer:
     """The state in which a session is that is not open."""
-    decision, unknown = record.decision, record.unknown
-    return SessionAnswer(
+    decision = record.decision
+    return SessionAnswer.of(
+        record.table,
+        record.unknown[-1].stimulus if record.unknown else None,
         id=name,
         open=False,
         state=state_of(
@@ -238,11 +240,6 @@ def _stood(name: str, record: SessionRecord) -> SessionAnswer:
             fault=any(isinstance(last, Event) and last.kind == "fault" for last in record.history[-1:]),
         ),
         subject=record.header.subject,
-        trials=len(record.table),
-        told=len(record.table.told),
-        open_trial=unknown[-1].trial if unknown else None,
-        open_isi_ms=unknown[-1].isi_ms if unknown else None,
-        open_intensity_pct_rmt=unknown[-1].intensity_pct_rmt if unknown else None,
         stop=decision is not None and decision.stop,
         reason=decision.reason if decision else "No trial has an outcome yet.",
         judged_since=decision is not None and record.is_judged_since,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
@@ -35,7 +35,7 @@ from isiw.studies.players import Alone, OwnCode, Player, Reported
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.summary import bayes_factor
-from isiw.types import Array
+from isiw.types import Array, Reference
 from isiw.window import Window
 
 TIMES = ("ask_ms", "tell_ms")
@@ -211,7 +211,8 @@ class _Participant:
 
     def respond(self, trial: int, choice: Choice) -> Response:
         """Deliver pairs until one is learnt; the first has the same noise with every strategy, others their own."""
-        space, respond = self.session.space, self.responder.respond
+        space = self.session.space
+        respond: Callable[[float, Reference], Response] = self.responder.respond
         for _ in range(_MOST_DELIVERIES):
             response = respond(choice.isi_ms, space.reference)
             if response.isi_ms is not None and wrong_isi(response.isi_ms, choice.isi_ms, space) is None:

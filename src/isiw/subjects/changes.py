@@ -41,13 +41,6 @@ class Plasticity(Checked):
     half_life_min: Positive | None = None
     turns_after: Positive | None = None
 
-    def log_gain(self, dose: float) -> float:
-        """The addition to the log gain after a dose: the facilitation, in 0–1, of all pairs so far, summed.
-
-        Of pairs inside the window, before the gain turns or is lost with time.
-        """
-        return -self.limit * math.expm1(-dose / self.pairs)
-
     def after(self, log_gain: float, facilitation: float, dose: float) -> float:
         """The change of the log gain after one more pair.
 

@@ -127,6 +127,10 @@ class EmgFloor(Checked):
         """Its expectation [mV]."""
         return self.median_mv * float(np.exp(0.5 * self.log_sd**2))
 
+    def sample_mv(self, rng: np.random.Generator) -> float:
+        """The amplitude of one sweep [mV]."""
+        return log_normal(rng, self.median_mv, self.log_sd)
+
 
 @dataclass(frozen=True)
 class TrialNoise:

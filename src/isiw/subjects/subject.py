@@ -11,18 +11,7 @@ from typing import Annotated, Final, TypeAlias, get_args
 
 import numpy as np
 
-from isiw.checks import (
-    Checked,
-    Flag,
-    MeanAndSd,
-    NonNegative,
-    Number,
-    Positive,
-    Share,
-    choice,
-    number,
-    whole,
-)
+from isiw.checks import Checked, Flag, MeanAndSd, NonNegative, Number, Positive, Share, choice, number, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.excess import EDGE_LEVEL, LEAST_DEPRESSED_MV, window_from_excess
@@ -216,12 +205,7 @@ class Responder:
         return self._trials
 
     def respond(
-        self,
-        isi_ms: float | None,
-        reference: Reference,
-        *,
-        pulse: bool = True,
-        intensity_pct_rmt: float | None = None,
+        self, isi_ms: float | None, reference: Reference, *, pulse: bool = True, intensity_pct_rmt: float | None = None
     ) -> Response:
         """Answer one pair of stimuli, or one of them alone.
 
@@ -240,14 +224,12 @@ class Responder:
         isi_ms = None if isi_ms is None else number("an ISI [ms]", isi_ms)
         choice("the reference", reference, get_args(Reference))
         noise = self._next_noise()
+        subject, rng, facilitation = self.subject, self._rng, 0.0
         reported_ms, from_impact_ms = (None, None) if isi_ms is None else self._stimulate(isi_ms, reference)
-        facilitation = 0.0
         if from_impact_ms is not None and pulse:
-            facilitation = float(self.subject.facilitation(np.asarray(from_impact_ms), "impact", self._trials))
-        if from_impact_ms is not None and pulse:
+            facilitation = float(subject.facilitation(np.asarray(from_impact_ms), "impact", self._trials))
             self._remember(facilitation)
-        subject, rng = self.subject, self._rng
-        floor_mv = subject.response.floor.median_mv * np.exp(subject.response.floor.log_sd * rng.standard_normal())
+        floor_mv = subject.response.floor.sample_mv(rng)
         evoked_mv = self._response(intensity_pct_rmt).sample_evoked_mv(facilitation, noise, rng) if pulse else 0.0
         mep_mv = self._with_tap_mv(evoked_mv, noise, from_impact_ms) + floor_mv
         if rng.random() < subject.outlier_probability:
@@ -289,28 +271,19 @@ class Responder:
         tap_mv = tap.sample_mv(self._rng) * float(np.exp(noise.log_gain))
         return amplitude_of_both_mv(evoked_mv, tap, tap_mv, from_impact_ms)
 
-    def respond_instead(
-        self,
-        isi_ms: float | None,
-        reference: Reference,
-        *,
-        pulse: bool = True,
-        intensity_pct_rmt: float | None = None,
-    ) -> Response:
+    def respond_instead(self, isi_ms: float, reference: Reference) -> Response:
         """Answer one pair of stimuli that is given because another was lost; see `respond`.
 
         Its noise is drawn apart, so that what was lost does not move the noise of all later trials. What it does to the
         person, such as drift, goes on.
 
         Args:
-            isi_ms: the commanded ISI on the reference [ms]; None for TMS alone.
+            isi_ms: the commanded ISI on the reference [ms].
             reference: the event that the ISI counts from.
-            pulse: whether the magnetic pulse is given.
-            intensity_pct_rmt: its intensity [% RMT].
         """
         usual, self._rng = self._rng, np.random.default_rng([self._seed, 1, self._trials])
         try:
-            return self.respond(isi_ms, reference, pulse=pulse, intensity_pct_rmt=intensity_pct_rmt)
+            return self.respond(isi_ms, reference)
         finally:
             self._rng = usual
 

@@ -247,12 +247,7 @@ def _at_rest_mv(delivery: Delivery, signals: SignalLimits) -> float | None:
 
 
 def announcement(device: Device, iti_s: float) -> str:
-    """The number of stimuli that a check of a device gives, in words, and how long it takes; nothing is delivered.
-
-    Args:
-        device: the device.
-        iti_s: the time between two stimuli [s].
-    """
+    """How many stimuli a check gives, one every `iti_s` [s], in words, and how long it takes; nothing is delivered."""
     info = device.describe()
     if info.simulated:
         return f"{info.name} is simulated: nothing is delivered to anybody."

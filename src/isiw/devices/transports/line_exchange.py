@@ -139,15 +139,9 @@ class Line:
         )
 
     def die_armed(self, arm: LineExchange, disarm: LineExchange, timeout_s: float) -> float:
-        """Have another process arm, kill it, and wait until the instrument says that it is disarmed.
+        """Have another process arm and kill it; the time until the instrument says that it is disarmed [s].
 
-        Args:
-            arm: the command to arm.
-            disarm: the command that the other process's watchdog sends.
-            timeout_s: how long each answer may take [s].
-
-        Returns:
-            The time from the death to the answer [s].
+        The other process's watchdog disarms. Each answer may take `timeout_s` [s].
         """
         arming, (disarming, disarm_data) = next(_sequence), self._disarming(disarm)
         arm_data = self._written(arm.command(command_values(arming, 0, None)))

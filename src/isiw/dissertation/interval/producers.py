@@ -30,15 +30,7 @@ from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
-from isiw.checks import (
-    Checked,
-    NonNegative,
-    Number,
-    Positive,
-    Share,
-    number,
-    whole,
-)
+from isiw.checks import Checked, NonNegative, Number, Positive, Share, number, whole
 from isiw.dissertation.interval.task import SHORTEST_MS, score_pct
 from isiw.errors import InvalidValueError
 from isiw.lazy import botorch, gpytorch, torch

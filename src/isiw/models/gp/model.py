@@ -20,14 +20,7 @@ from isiw.excess import least_excess_mv
 from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit
 from isiw.models.gp.places import Tensor
-from isiw.models.gp.prior import (
-    LOG_SCALE_MV,
-    ProcessSettings,
-    Standardisation,
-    Transform,
-    expected_mep_mv,
-    scale_of,
-)
+from isiw.models.gp.prior import LOG_SCALE_MV, ProcessSettings, Standardisation, Transform, expected_mep_mv, scale_of
 from isiw.models.protocol import Observation
 from isiw.models.shared.draws import systematic
 from isiw.models.shared.history import AmplitudeHistory, FloorKind, FloorTreatment, OfAmplitudes, PersonTrials
@@ -118,8 +111,7 @@ def _profiles(found: Fit, picks: Tensor, isi_ms: Tensor, z: Tensor) -> Tensor:
     surplus[-1] -= deviates
     variance = found.processes.amplitude[which].square()
     factor = torch.linalg.cholesky(covariance + torch.diag_embed(torch.outer(variance, surplus)))
-    drawn: Tensor = mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
-    return drawn
+    return mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
 
 
 def _constants(found: Fit, noise: Tensor, z: Tensor) -> Tensor:

@@ -15,20 +15,12 @@ from isiw.models.parametric.tensors import Tensor
 def log_between(low: Tensor, high: Tensor) -> Tensor:
     """Log of the probability that a standard normal variable is between two ends, broadcast shape; -inf if they meet.
 
-    Args:
-        low: the lower ends; they may be -inf.
-        high: the upper ends; they may be inf.
+    Ends may be infinite.
     """
     right = low > 0  # by symmetry, what is above the middle is looked at from below
     first, last = torch.where(right, -high, low), torch.where(right, -low, high)
     below_first, below_last = torch.special.log_ndtr(first), torch.special.log_ndtr(last)
-    between: Tensor = below_last + _log_complement(below_first - below_last)
-    return between
-
-
-def between(low: Tensor, high: Tensor) -> Tensor:
-    """The probability that a standard normal variable is between two ends; see `log_between`."""
-    return log_between(low, high).exp()
+    return below_last + _log_complement(below_first - below_last)
 
 
 def _log_complement(log_share: Tensor) -> Tensor:

@@ -8,7 +8,6 @@ import ipaddress
 import threading
 from collections.abc import AsyncIterator
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Final, Self
 
@@ -19,6 +18,7 @@ from plotly.offline import get_plotlyjs
 import isiw
 from isiw.checks import whole
 from isiw.errors import InvalidValueError
+from isiw.report.html import asset
 from isiw.server.answers import OkAnswer, Refusal
 from isiw.server.app import Server, guarded, listening, new_token, settings_of
 from isiw.server.guard import Rules
@@ -35,12 +35,12 @@ QUIET_S: Final = 1.0
 BY_PAGE: Final = "on the live page"
 
 FILES: Final = {
-    "/": ("text/html", lambda: _asset("isiw.server", "live.html")),
-    "/page.css": ("text/css", lambda: _asset("isiw.report", "page.css")),
-    "/live.css": ("text/css", lambda: _asset("isiw.server", "live.css")),
-    "/panel.js": ("text/javascript", lambda: _asset("isiw.server", "panel.js")),
-    "/draw.js": ("text/javascript", lambda: _asset("isiw.report", "draw.js")),
-    "/live.js": ("text/javascript", lambda: _asset("isiw.server", "live.js")),
+    "/": ("text/html", lambda: asset("live.html", "isiw.server")),
+    "/page.css": ("text/css", lambda: asset("page.css")),
+    "/live.css": ("text/css", lambda: asset("live.css", "isiw.server")),
+    "/panel.js": ("text/javascript", lambda: asset("panel.js", "isiw.server")),
+    "/draw.js": ("text/javascript", lambda: asset("draw.js")),
+    "/live.js": ("text/javascript", lambda: asset("live.js", "isiw.server")),
     "/plotly.js": ("text/javascript", get_plotlyjs),
 }
 """Files that say nothing of the session: those of the page, by path, with their type."""
@@ -60,10 +60,6 @@ _HEADERS: Final = {
 _UPDATES_HEADERS: Final = {**_HEADERS, "Cache-Control": "no-store"}
 
 router = APIRouter()
-
-
-def _asset(room: str, name: str) -> str:
-    return (resources.files(room) / "assets" / name).read_text(encoding="utf-8")
 
 
 @cache
