@@ -89,7 +89,7 @@ def replay(
             # Behind a lost trial the strategy knew more than the log does.
             comparable = entry.isi_ms is not None and entry.trial == len(learned) and entry.trial in compared
             if comparable and not is_asked_again(asked_ms := ask(strategy, learned), strategy, entry):
-                _require_other_versions(entry, asked_ms, record.header)
+                _require_other_versions(entry, asked_ms, record.header, strategy.seed)
                 differing.append(entry.trial)
         elif isinstance(entry, Trial):
             strategy.learn(entry)
@@ -176,7 +176,7 @@ def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
     return known
 
 
-def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
+def _require_other_versions(intent: Intent, asked_ms: float, header: Header, seed: int) -> None:
     """Raise if the strategy has no reason to ask something else than it did."""
     now = SCHEMA_VERSION, ESTIMATE_VERSION, ENGINE_VERSION
     same = (header.schema_version, header.belief_version, header.engine_version) == now
@@ -185,8 +185,10 @@ def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> 
             f"the strategy does not ask again what was asked in trial {intent.trial}",
             got=f"{asked_ms:g} ms",
             expected=f"{intent.isi_ms} ms, as logged with {versions_text(header)}",
-            remedy="Resume with the same strategy and on the same machine, or without verification: the logged trials "
-            "are then told as they are.",
+            remedy=f"Its seed is {seed}, the log's {header.strategy.seed}: make it with seed={header.strategy.seed}."
+            if seed != header.strategy.seed
+            else "Resume with the same strategy and on the same machine, or without verification: the logged trials are "
+            "then told as they are.",
         )
 
 
@@ -330,4 +332,4 @@ def _resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Ev
     if len(changed_after(record.events)) > MOST_NOTED:  # earlier versions took more
         sentences.append(f"{MANY_CHANGES}")
     last = len(replayed.trials) - 1 if replayed.trials else None
-    return Event(kind="resume", trial=last, text=" ".join((*sentences, *record.losses)))
+    return Event(kind="resume", trial=last, text=" ".join(sentences))
