@@ -260,8 +260,11 @@ def test_the_first_stimulus_after_resuming_waits_a_whole_interval(
 
 def test_another_strategy_is_refused_before_anything_happens(interrupted: Path) -> None:
     before = interrupted.read_bytes()
-    with pytest.raises(StrategyError, match=r"asked in trial 0.*seed is 1, the log's 0: make it with seed=0"):
+    with pytest.raises(StrategyError, match=r"another seed.*got 1; expected 0.*seed=0"):
         resume(interrupted, ScriptedDevice(), scripted_strategy(10, seed=1))
+    other = make_strategy("even", scripted_strategy().space, particles=10)
+    with pytest.raises(StrategyError, match="asked in trial 0"):
+        resume(interrupted, ScriptedDevice(), other)
     assert interrupted.read_bytes() == before
 
 

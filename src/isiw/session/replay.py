@@ -77,6 +77,14 @@ def replay(
             expected=str(record.header.space),
             remedy="Make it with space=isiw.read_session(LOG).header.space.",
         )
+    seed = record.header.strategy.seed
+    if verify and strategy.seed != seed:  # by chance it may have asked the same so far
+        raise StrategyError(
+            "the strategy has another seed than the session",
+            got=strategy.seed,
+            expected=str(seed),
+            remedy=f"Make it with seed={seed}.",
+        )
     learned: list[Trial] = []
     changes: list[int] = []
     differing: list[int] = []
@@ -89,7 +97,7 @@ def replay(
             # Behind a lost trial the strategy knew more than the log does.
             comparable = entry.isi_ms is not None and entry.trial == len(learned) and entry.trial in compared
             if comparable and not is_asked_again(asked_ms := ask(strategy, learned), strategy, entry):
-                _require_other_versions(entry, asked_ms, record.header, strategy.seed)
+                _require_other_versions(entry, asked_ms, record.header)
                 differing.append(entry.trial)
         elif isinstance(entry, Trial):
             strategy.learn(entry)
@@ -176,7 +184,7 @@ def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
     return known
 
 
-def _require_other_versions(intent: Intent, asked_ms: float, header: Header, seed: int) -> None:
+def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
     """Raise if the strategy has no reason to ask something else than it did."""
     now = SCHEMA_VERSION, ESTIMATE_VERSION, ENGINE_VERSION
     same = (header.schema_version, header.belief_version, header.engine_version) == now
@@ -185,10 +193,8 @@ def _require_other_versions(intent: Intent, asked_ms: float, header: Header, see
             f"the strategy does not ask again what was asked in trial {intent.trial}",
             got=f"{asked_ms:g} ms",
             expected=f"{intent.isi_ms} ms, as logged with {versions_text(header)}",
-            remedy=f"Its seed is {seed}, the log's {header.strategy.seed}: make it with seed={header.strategy.seed}."
-            if seed != header.strategy.seed
-            else "Resume with the same strategy and on the same machine, or without verification: the logged trials are "
-            "then told as they are.",
+            remedy="Resume with the same strategy and on the same machine, or without verification: the logged trials "
+            "are then told as they are.",
         )
 
 
