@@ -235,3 +235,21 @@ def test_a_share_that_may_be_in_percent_is_refused_with_that_way_out(value: obje
     with pytest.raises(InvalidValueError, match="from 0 to 1") as refused:
         share("p", value)
     assert ("Is it in %? Divide by 100." in str(refused.value)) == is_in_percent
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda mv: isiw.DeviceInfo("rig", "impact", detection_limit_mv=mv),
+        lambda mv: isiw.make_strategy(detection_limit_mv=mv, particles=10),
+        lambda mv: isiw.make_strategy(response_threshold_mv=mv, particles=10),
+    ],
+)
+def test_a_smallest_amplitude_in_microvolts_is_asked_about(make: Any) -> None:
+    make(0.05)
+    with pytest.raises(isiw.errors.IsiwError, match=r"at most 1 mV.*Is it in µV\? Divide by 1000"):
+        make(50.0)
+
+
+def test_an_amplitude_of_minus_zero_is_zero() -> None:
+    assert math.copysign(1.0, amplitude("mep_mv", -0.0)) == 1.0

@@ -43,7 +43,8 @@ classdef isiw < handle
 
     function create(this, id, plan)
       % Begin a session. PLAN may have the fields seed, visit, space, strategy, limits and protocol, as a configuration.
-      % Its field earlier has TMS alone that was given before: struct('mep_mv', [..], 'intensity_pct_rmt', [..]).
+      % Its field earlier has TMS alone that was given before: struct('mep_mv', [..], 'intensity_pct_rmt', [..]). A list of
+      % one value needs double braces, {{0.9}}, as jsonencode makes a number of [0.9].
       if nargin < 3
         plan = struct();
       end
@@ -227,6 +228,9 @@ function text = number(value)
   % A number with all its digits; none is an empty text.
   if isempty(value)
     text = '';
+  elseif ~isscalar(value) || ~(isnumeric(value) || islogical(value)) || ~isreal(value)
+    error('isiw:NoNumber', 'a single number is needed, not %d of class %s. Nothing was sent.', ...
+          numel(value), class(value));
   else
     text = sprintf('%.17g', value);
   end

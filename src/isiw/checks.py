@@ -38,7 +38,7 @@ from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from isiw.errors import InvalidValueError, did_you_mean
-from isiw.findings import AMPLITUDE_MV, DELAY_MS, INTERVAL_S, SHARE
+from isiw.findings import AMPLITUDE_MV, DELAY_MS, INTERVAL_S, SHARE, SMALLEST_MV
 
 _T = TypeVar("_T")
 
@@ -89,6 +89,13 @@ def amplitude(what: str, value: object) -> float:
             expected=f"an amplitude in mV, at most {MOST_MEP_MV:g}",
             remedy=AMPLITUDE_MV.slip(plain),
         )
+    return plain + 0.0  # -0.0, which is equal to it, is shown otherwise
+
+
+def smallest_amplitude(what: str, value: object) -> float:
+    """An amplitude below which none is measured, or none counts as a response [mV]."""
+    plain = number(what, value, above=0)
+    SMALLEST_MV.require(f"{what} is above most MEPs", plain, f"at most {SMALLEST_MV.most:g} mV", got=value)
     return plain
 
 
@@ -203,6 +210,7 @@ Positive: TypeAlias = Annotated[float, partial(number, above=0)]
 NonNegative: TypeAlias = Annotated[float, partial(number, least=0)]
 Share: TypeAlias = Annotated[float, share]
 Amplitude: TypeAlias = Annotated[float, amplitude]
+SmallestAmplitude: TypeAlias = Annotated[float, smallest_amplitude]
 AmplitudeInterval: TypeAlias = Annotated[tuple[float, float], amplitude_interval]
 MeanAndSd: TypeAlias = Annotated[tuple[float, float], mean_and_sd]
 Count: TypeAlias = Annotated[int, partial(whole, least=1)]

@@ -156,6 +156,9 @@ class UnitScale:
 AMPLITUDE_MV: Final = UnitScale(2e-4, 30.0, ("V", 1000), ("µV", 1000))
 """Of an MEP: the noise of the electrodes alone has more than the least, and no muscle gives more than the most."""
 
+SMALLEST_MV: Final = UnitScale(most=1.0, too_large=("µV", 1000))
+"""The least amplitude that is measured, or counts as a response; nobody leaves out all that is below a millivolt."""
+
 BACKGROUND_LIMIT_UV: Final = UnitScale(0.2, too_small=("mV", 1000))
 """The most EMG at rest that somebody allows; no amplifier is so quiet as the least."""
 

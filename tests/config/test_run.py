@@ -365,6 +365,9 @@ def test_a_session_after_a_search_for_the_threshold_knows_its_pulses_and_counts_
     said = given_before(config).sentence(config)
     assert "6 pulses of the search for the threshold came before" in said
     assert "of FCR, at the same hot spot" in said
+    twice = config_file(f'after = ["FCR-P07.mcap"]\nearlier = ["curve.csv", "./curve.csv"]\n{VISIT}')
+    with pytest.raises(ConfigError, match=r"named twice.*Name it once"):
+        session_for(load_config(twice).with_overrides(log=tmp_path / "c.mcap"))
 
 
 def test_a_search_of_another_muscle_or_person_is_refused_and_one_without_a_muscle_is_named(

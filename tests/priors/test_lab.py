@@ -81,6 +81,12 @@ def test_the_same_person_twice_is_refused_unless_told(tmp_path: Path) -> None:
     assert len(priors.learn(twice, again=True).sessions) == 2
 
 
+def test_another_spelling_of_a_code_is_the_same_person(tmp_path: Path) -> None:
+    twice = [write_log(tmp_path / code / "s.mcap", subject=code, trials=3, seed=7) for code in ("P07", "p-07")]
+    with pytest.raises(LogError, match=r"same person.*--again"):
+        priors.learn(twice)
+
+
 def test_people_without_a_name_may_be_the_same(tmp_path: Path) -> None:
     unnamed = [write_log(tmp_path / f"{k}.mcap", subject="", trials=4, seed=k) for k in range(2)]
     with pytest.raises(LogError, match="do not say of whom"):

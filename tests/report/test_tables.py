@@ -7,6 +7,7 @@ import pytest
 
 from isiw.findings import Kind
 from isiw.log.record import SessionRecord, read_session
+from isiw.log.records import Onset
 from isiw.log.schema import Event, Intent, Record
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.session.afterwards import exclude
@@ -61,7 +62,9 @@ def test_what_was_delivered_stands_beside_what_may_be(record: SessionRecord) -> 
     assert told["of them with an unknown outcome"] == ("0", "")
 
 
-def test_times_are_not_compared_across_a_resumption_nor_with_what_was_refused(record: SessionRecord) -> None:
+def test_the_sessions_clock_says_nothing_across_a_resumption_nor_of_what_was_refused(
+    record: SessionRecord,
+) -> None:
     after: list[Record] = [
         Event(kind="resume", trial=5, text=""),
         Intent(trial=6, isi_ms=1.0, t_s=26.0),
@@ -70,8 +73,34 @@ def test_times_are_not_compared_across_a_resumption_nor_with_what_was_refused(re
         Intent(trial=7, isi_ms=1.0, t_s=31.0),
     ]
     told = counted(replace(record, history=(*record.history, *after)))
-    assert told["shortest time between two stimuli"][0] == "4.00 s"
+    assert told["shortest time between two stimuli"][0] == "4.00 s; across a resumption not known"
     assert told["refused before delivery"][0] == "1"
+
+
+@pytest.mark.parametrize(
+    ("gap_s", "simulated", "said"),
+    [
+        (3.0, False, "3.00 s"),
+        (60.0, False, "5.00 s"),
+        (-600.0, False, "5.00 s; across a resumption not known"),  # the clock was set back
+        (3.0, True, "5.00 s; across a resumption not known"),  # whose clock is virtual
+    ],
+)
+def test_the_time_across_a_resumption_is_the_computers(
+    record: SessionRecord, gap_s: float, *, simulated: bool, said: str
+) -> None:
+    history = (*record.history, Event(kind="resume", trial=5), Intent(trial=6, isi_ms=1.0, t_s=0.0))
+    onsets = {**record.onsets, 6: Onset(max(0.0, gap_s) + record.onsets[5].onset_s, 0)}
+    header = record.header.model_copy(update={"device": replace(record.header.device, simulated=simulated)})
+    found = counted(replace(record, header=header, history=history, onsets=onsets))
+    assert found["shortest time between two stimuli"][0] == said
+
+
+def test_what_isiw_excluded_is_not_the_operators(record: SessionRecord) -> None:
+    history = (*record.history, Event(kind="exclusion", trial=0, text="far from those asked", finding=Kind.ISIS_FAR))
+    why = {number: why for number, _, why in lost_rows(replace(record, history=history))}
+    assert why[0] == "excluded by isiw: far from those asked"
+    assert why[4] == "excluded by the operator: sneezed"
 
 
 def test_a_log_without_times_says_so(record: SessionRecord) -> None:

@@ -66,21 +66,50 @@ disp(lab.trials);
 
 GIVEN = """
 lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
-given = struct('mep_mv', [0.02 0.9 1.4], 'intensity_pct_rmt', [95 115 130]);
+given = PULSES;
 lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr'), 'earlier', given));
 lab.alone(1.1, 120);
 lab.close();
 """
 
 
-def test_pulses_over_the_curve_are_given_before_and_within_a_session(tmp_path: Path) -> None:
-    (tmp_path / "given.m").write_text(GIVEN)
+@pytest.mark.parametrize(
+    ("pulses", "before"),
+    [
+        ("'mep_mv', [0.02 0.9 1.4], 'intensity_pct_rmt', [95 115 130]", [(0.02, 95.0), (0.9, 115.0), (1.4, 130.0)]),
+        ("'mep_mv', {{0.9}}, 'intensity_pct_rmt', {{115}}", [(0.9, 115.0)]),
+    ],
+)
+def test_pulses_over_the_curve_are_given_before_and_within_a_session(
+    tmp_path: Path, pulses: str, before: list[tuple[float, float]]
+) -> None:
+    (tmp_path / "given.m").write_text(GIVEN.replace("PULSES", f"struct({pulses})"))
     with client_of(tmp_path / "sessions") as client:
         ran = octave(client, str(tmp_path / "given.m"))
     assert ran.returncode == 0, ran.stderr
     record = read_session(tmp_path / "sessions" / "P07.mcap")
     known = [(trial.mep_mv, trial.intensity_pct_rmt) for trial in (*record.header.earlier, *record.table)]
-    assert known == [(0.02, 95.0), (0.9, 115.0), (1.4, 130.0), (1.1, 120.0)]
+    assert known == [*before, (1.1, 120.0)]
+
+
+NO_NUMBER = """
+lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr')));
+[trial, isi_ms] = lab.ask();
+try, lab.tell(trial, '50', 0.1); catch problem, disp(problem.identifier); end
+try, lab.tell(trial, [5 0], 0.1); catch problem, disp(problem.identifier); end
+try, lab.tell(trial, isi_ms, {0.1}); catch problem, disp(problem.identifier); end
+lab.tell(trial, isi_ms, single(0.5));
+lab.close();
+"""
+
+
+def test_a_text_or_several_numbers_are_never_joined_to_another_number(tmp_path: Path) -> None:
+    (tmp_path / "none.m").write_text(NO_NUMBER)
+    with client_of(tmp_path / "sessions") as client:
+        ran = octave(client, str(tmp_path / "none.m"))
+    assert (ran.returncode, ran.stdout.split()) == (0, ["isiw:NoNumber"] * 3), ran.stderr
+    assert [trial.mep_mv for trial in read_session(tmp_path / "sessions" / "P07.mcap").table] == [0.5]
 
 
 SEVERAL = """

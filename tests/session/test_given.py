@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.session import open_threshold, read_threshold
+from isiw.session import open_threshold, read_threshold, resume_threshold
 from isiw.session.given import given_pulses
 from isiw.session.threshold import search_of
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
@@ -67,6 +68,18 @@ def test_a_search_without_a_threshold_takes_that_of_the_one_before(tmp_path: Pat
     assert len({trial.index for trial in both}) == 9
     with pytest.raises(InvalidValueError, match=r"shares of no known threshold.*Continue it"):
         given_pulses([read_threshold(short), read_threshold(whole)])
+
+
+def test_no_search_counts_twice_whatever_was_excluded_in_a_copy(tmp_path: Path) -> None:
+    log = search(tmp_path / "a.mcap")
+    copy = Path(shutil.copy(log, tmp_path / "copy.mcap"))
+    with resume_threshold(copy) as session:
+        session.exclude(0, "the coil moved")
+        session.ask()
+        session.tell(0.1)
+    for logs in ((log, log), (log, copy)):
+        with pytest.raises(InvalidValueError, match="of the same search"):
+            given_pulses([read_threshold(each) for each in logs])
 
 
 def test_pulses_at_many_places_are_no_recruitment_curve(tmp_path: Path) -> None:

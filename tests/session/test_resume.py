@@ -260,8 +260,11 @@ def test_the_first_stimulus_after_resuming_waits_a_whole_interval(
 
 def test_another_strategy_is_refused_before_anything_happens(interrupted: Path) -> None:
     before = interrupted.read_bytes()
-    with pytest.raises(StrategyError, match="asked in trial 0"):
+    with pytest.raises(StrategyError, match=r"another seed.*got 1; expected 0.*seed=0"):
         resume(interrupted, ScriptedDevice(), scripted_strategy(10, seed=1))
+    other = make_strategy("even", scripted_strategy().space, particles=10)
+    with pytest.raises(StrategyError, match="asked in trial 0"):
+        resume(interrupted, ScriptedDevice(), other)
     assert interrupted.read_bytes() == before
 
 
@@ -395,7 +398,7 @@ def test_a_log_with_a_lost_trial_goes_on_without_it(interrupted: Path) -> None:
     result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert result.trials[1].reason is Kind.OUTCOME_UNKNOWN
     assert len(result.trials) == 10
-    assert "fails its checksum" in read_session(interrupted).events[-1].text
+    assert "fails its checksum" in read_session(interrupted).losses[0]
     again = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert again.trials == result.trials
 

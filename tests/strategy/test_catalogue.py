@@ -246,6 +246,11 @@ def test_a_name_of_another_type_is_unknown(name: str) -> None:
         make_strategy(name)
 
 
+def test_a_function_of_ones_own_with_a_dot_for_the_colon_is_told_how() -> None:
+    with pytest.raises(StrategyError, match=r"named with a colon, in a study: \"lab\.models:mine\""):
+        settings_for("lab.models.mine")
+
+
 @pytest.mark.parametrize("space", [None, "valve", (0, 500)])
 def test_what_is_no_design_space_is_refused(space: DesignSpace) -> None:
     with pytest.raises(InvalidValueError, match=r"a design space.*isiw.DesignSpace"):

@@ -53,8 +53,16 @@ def given_before(config: RunConfig) -> Given:
         [record for record in after if isinstance(record, SessionRecord)],
         searches,
         [read_session(path) for path in config.earlier if not is_table(path)],
-        [pulse for path in config.earlier if is_table(path) for pulse in _pulses_of_table(path)],
+        [pulse for path in _tables(config) for pulse in _pulses_of_table(path)],
     )
+
+
+def _tables(config: RunConfig) -> list[Path]:
+    """The tables of earlier pulses, each once."""
+    tables = [path.resolve() for path in config.earlier if is_table(path)]
+    if twice := next((path for path in tables if tables.count(path) > 1), None):
+        raise ConfigError("a table of earlier pulses is named twice", got=str(twice), remedy="Name it once.")
+    return tables
 
 
 def _require_searches(config: RunConfig, searches: Sequence[ThresholdRecord]) -> None:

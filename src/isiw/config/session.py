@@ -174,7 +174,8 @@ def earlier_trials(config: RunConfig, device: DeviceInfo, given: Given) -> Befor
                 expected=f"{device.conditioning} and {device.reference}",
                 remedy="Leave this file out.",
             )
-    trials = [*given_pulses(given.searches), *given.pulses]
+    searches = sorted(given.searches, key=lambda search: search.header.created)
+    trials = [*given_pulses(searches), *given.pulses]
     changed: set[int] = set()
     for record in records:
         before = before_of(record, trials)

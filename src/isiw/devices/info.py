@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from isiw.checks import Checked, Count, Flag, MeanAndSd, NonNegative, Number, Positive, Text, text
+from isiw.checks import Checked, Count, Flag, MeanAndSd, NonNegative, Number, SmallestAmplitude, Text, text
 from isiw.errors import InvalidValueError
 from isiw.types import Conditioning, Reference
 
@@ -47,7 +47,7 @@ class DeviceInfo(Checked):
     simulated: Flag = False
     channels: Mapping[str, str] = field(default_factory=dict)
     version: Text = ""
-    detection_limit_mv: Positive | None = None
+    detection_limit_mv: SmallestAmplitude | None = None
     hit_delay_ms: MeanAndSd | None = None
     address: Text = ""
     tap_alone: Flag = False

@@ -15,6 +15,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
+from isiw.findings import NO_MEP, is_silent
 from isiw.metrics import f1
 from isiw.plots.comparison import replay_figure
 from isiw.plots.style import save_figure
@@ -24,6 +25,9 @@ from isiw.types import FloatArray
 from isiw.window import Window
 
 NEAR_MS: Final = 2.5  # half of the dissertation's step between ISIs; what is farther away answers another one
+_MARKS: Final = (5, 10, 15, 20, 30, 40, 60, 80, 100)
+"""Numbers of stimuli at which the agreement is said."""
+
 SHARED: Final = (
     "The trials that answer are among those of the answer from all trials, so that the two agree more than two "
     "sessions of this person would. Each amplitude is as it was recorded at its place in the session: drift and a "
@@ -101,7 +105,7 @@ class Replay:
     def _lines(self, name: str) -> Iterator[str]:
         scores = self.f1_by_trial(name)
         low, middle, high = np.quantile(scores, (0.0, 0.5, 1.0), axis=0)
-        at = [n for n in (5, 10, 15, 20, 30, 40, 60, 80, 100) if n <= scores.shape[1]]
+        at = [n for n in _MARKS if n <= scores.shape[1]] or [scores.shape[1]]
         yield f"{name}  {', '.join(f'{n}: {middle[n - 1]:.2f} ({low[n - 1]:.2f}–{high[n - 1]:.2f})' for n in at)}"
         runs = [run for run in self.runs if run.strategy == name]
         if stops := [run.stopped for run in runs if run.stopped is not None]:
@@ -144,14 +148,17 @@ def replay(
         **settings: settings that all of the strategies have.
 
     Raises:
-        InvalidValueError: too few trials, or no whole numbers.
+        InvalidValueError: fewer than five pairs, all amplitudes 0, or no whole numbers.
         StrategyError: an unknown strategy or setting.
     """
     space = space or delivered.space()
     seeds, trials = whole("seeds", seeds, least=1), whole("trials", trials, least=1)
     pairs = [trial for trial in delivered.trials.told if trial.isi_ms is not None and space.admits(trial.isi_ms)]
-    if len(pairs) < 2:
-        raise InvalidValueError("too few trials to answer a strategy", got=len(pairs), expected="two and more")
+    if len(pairs) < _MARKS[0]:
+        expected = f"{_MARKS[0]} pairs and more"
+        raise InvalidValueError("too few trials to answer a strategy", got=len(pairs), expected=expected)
+    if is_silent([trial.mep_mv for trial in pairs if trial.mep_mv is not None], settings.get("detection_limit_mv")):
+        raise InvalidValueError(f"{NO_MEP}", got=f"{len(pairs)} amplitudes of 0")
     runs = []
     for name in strategies:
         for seed in range(first_seed, first_seed + seeds):

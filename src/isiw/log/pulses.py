@@ -10,10 +10,12 @@ import datetime as dt
 import math
 import os
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.log.codes import is_same_person
 from isiw.log.headers import Header
 from isiw.log.kinds import LogKind
 from isiw.log.moments import Ages, Moment
@@ -22,7 +24,7 @@ from isiw.log.reader import LoggedSession, of_production, read_any
 from isiw.log.salvage import Salvage, holds, salvage
 from isiw.log.schema import Event, Intent, Message, Record, decode
 from isiw.opening import is_mcap, opened
-from isiw.text.sanitize import counted
+from isiw.text.sanitize import counted, plain
 from isiw.trials import Trial
 
 _SUFFIXES = {".mcap", ".part"}
@@ -114,11 +116,23 @@ def earlier_pulse_ages(folder: str | Path, subject: str, period_s: float, *, but
     if not folder.is_dir():
         raise LogError("there is no such folder of logs", got=str(folder), remedy="Check Safeguards.earlier_logs.")
     own = log_of(but.resolve())
-    recent = sorted(_recent(folder, period_s, now) - {own})
-    given = {stimulus for log in recent for stimulus in _of_subject(log, subject)}
+    given, codes = set[Given](), set[str]()
+    for log in sorted(_recent(folder, period_s, now) - {own}):
+        code, stimuli = _of_subject(log, subject)
+        given.update(stimuli)
+        codes |= {code} if stimuli else set()
     if log_exists(own):
         given -= set(_given(salvage(own)))  # of which there may be a copy
-    return _aged(given, now, period_s)
+    ages = _aged(given, now, period_s)
+    return replace(ages, doubts=(*ages.doubts, *_spelt_otherwise(codes - {subject}, subject)))
+
+
+def _spelt_otherwise(codes: Iterable[str], subject: str) -> Iterator[str]:
+    if names := ", ".join(sorted(codes)):
+        yield (
+            f"Earlier stimuli of {plain(names)} count for {plain(subject)}, too: the codes differ only in case, "
+            "spaces, hyphens or underscores."
+        )
 
 
 def _recent(folder: Path, period_s: float, now: Moment) -> set[Path]:
@@ -177,15 +191,16 @@ def _resumed(salvaged: Salvage) -> int:
     return sum(isinstance(record, Event) and record.kind == "resume" for record in records)
 
 
-def _of_subject(log: Path, subject: str) -> list[Given]:
+def _of_subject(log: Path, subject: str) -> tuple[str, list[Given]]:
+    """The stimuli of a log if it is of a person, and the code by which it says so."""
     salvaged = salvage(log)
     if of_production(salvaged) and not _given(salvaged):  # nobody is stimulated in such a task
-        return []
+        return "", []
     record = read_any(salvaged, LogKind.SEARCH, LoggedSession)
     record.require_read("subject", "device")
     header = record.header
-    if header.subject != subject or header.device.simulated:
-        return []
+    if not is_same_person(header.subject, subject) or header.device.simulated:
+        return "", []
     if salvaged.end_lost and not _went_on(salvaged):
         raise DamagedLogError(
             "the end of an earlier log of this subject is missing, so the number of stimuli given is unknown",
@@ -193,7 +208,7 @@ def _of_subject(log: Path, subject: str) -> list[Given]:
             remedy="Resume that session with the number of pulses that were lost, or wait until the period is over.",
         )
     given = _given(salvaged)
-    return _dated(given, header) if isinstance(header, Header) and header.imported else given
+    return header.subject, _dated(given, header) if isinstance(header, Header) and header.imported else given
 
 
 def _dated(given: Iterable[Given], header: Header) -> list[Given]:

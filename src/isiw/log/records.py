@@ -201,7 +201,9 @@ class Records:
         """The number of stimuli that the index counts, those of lost records among them; refused ones do not count."""
         counted, history = self.salvaged.counted, self.history
         lost = counted.get("/intent", 0) - sum(isinstance(record, Intent) for record in history)
-        return max(lost + len(_standing(history)), counted.get("/trial", 0))
+        last = (entry.trial for entry in history if isinstance(entry, Event) and entry.kind == "loss")
+        before = [number + 1 for number in last if number is not None]
+        return max(lost + len(_standing(history)), counted.get("/trial", 0), *before)
 
     def take(self, message: Message) -> None:
         """Take one more record."""
@@ -227,6 +229,8 @@ class Records:
             self.history.append(record)
         elif not isinstance(record, Waveform):
             self.history.append(record)
+            if isinstance(record, Event) and record.kind == "loss":
+                self.losses.append(record.text)
             self.onsets.take(record, message.log_time_ns)
 
 

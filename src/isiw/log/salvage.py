@@ -29,7 +29,8 @@ _PERMISSIONS: Final = "Check its permissions and those of its folder."
 class Salvage:
     """All that was read of a log; `losses` are sentences, and topics are known even if their definition is lost.
 
-    With `end_lost` nobody knows how many stimuli there were; `counted` has the index's counts by topic. Of waveforms on
+    Those of them in `harmless` cost no record, or one that was never finished, so that nothing rested on it. With
+    `end_lost` nobody knows how many stimuli there were; `counted` has the index's counts by topic. Of waveforms on
     other `topics_kept` the samples are not kept; with None all are.
     """
 
@@ -40,10 +41,21 @@ class Salvage:
     messages: list[Message] = field(default_factory=list)
     attachments: dict[str, bytes] = field(default_factory=dict)
     losses: list[str] = field(default_factory=list)
+    harmless: set[str] = field(default_factory=set)
     finished: bool = False
     end_lost: bool = False
     counted: dict[str, int] = field(default_factory=dict)
     topics: dict[int, str] = field(default_factory=lambda: {number: topic for topic, number in CHANNEL_IDS.items()})
+
+    @property
+    def lost_records(self) -> list[str]:
+        """The losses that cost records, or may have."""
+        return [loss for loss in self.losses if loss not in self.harmless]
+
+    def note_harmless(self, sentence: str) -> None:
+        """Note damage that cost no record."""
+        self.losses.append(sentence)
+        self.harmless.add(sentence)
 
 
 def current_file(path: str | Path) -> Path:
@@ -121,7 +133,7 @@ def _read_file(file: IO[bytes], found: Salvage) -> None:
     reading.read()
     counted = counted_records(file)
     if counted is None and found.finished and not found.losses:
-        found.losses.append("The index at the end of the file fails its checksum. No record is affected.")
+        found.note_harmless("The index at the end of the file fails its checksum. No record is affected.")
     _put_in_order(found)
     _report_gaps(found, 0 if counted is None else counted.message_count)
     if counted is not None:
@@ -154,16 +166,16 @@ class _Reading:
             if self._has_missed_some():
                 self._search()
             if not found.losses:
-                found.losses.append("The checksum of the whole file fails, though every record's own is good.")
+                found.note_harmless("The checksum of the whole file fails, though every record's own is good.")
         except UNREADABLE as error:
             at_a_records_end = isinstance(error, EndOfFile) and self.file.tell() == self._readable_to
             self.sealed = self.whole = self.sealed and not self._has_missed_some()
             if not self.sealed:
                 self._read_torn(at_a_records_end=at_a_records_end)
             elif found.path.suffix != ".part":  # a session that was killed while it closed its log has lost nothing
-                found.losses.append("The index at the end of the file is damaged. No record is affected.")
+                found.note_harmless("The index at the end of the file is damaged. No record is affected.")
         if found.finished and not self.sealed:
-            found.losses.append("The mark behind the last record is damaged. No record is affected.")
+            found.note_harmless("The mark behind the last record is damaged. No record is affected.")
 
     def _read_records(self) -> None:
         whole = cast("IO[bytes]", _Exact(self.file))
@@ -205,7 +217,23 @@ class _Reading:
                 )
             return
         self._search()
+        if not closed and self._is_unfinished():
+            found.note_harmless(
+                f"The last record, at byte {self._readable_to} of {found.size}, was not finished when the session "
+                "died. Nothing is lost that was on the disk before."
+            )
+            return
         found.losses.insert(0, f"The log is torn or damaged at byte {self._readable_to} of {found.size}.")
+
+    def _is_unfinished(self) -> bool:
+        """True if the file ends within the record at which reading ended: it was never synced, nothing followed it."""
+        self.file.seek(self._readable_to)
+        rest = self.file.read()
+        if not rest.strip(b"\0"):  # a file may be longer than what was written when the power went
+            return True
+        ends = self._readable_to + RECORD_HEAD_BYTES + int.from_bytes(rest[1:RECORD_HEAD_BYTES], "little")
+        is_cut = len(rest) < RECORD_HEAD_BYTES or ends > self.found.size
+        return is_cut and all(start < self._readable_to for start, _ in self._marked())
 
     def _has_missed_some(self) -> bool:
         """True if there are chunks that were not met, as a damaged record was taken for another or for a longer one."""
@@ -215,6 +243,7 @@ class _Reading:
         """Read all chunks of a file in which the records' lengths can no longer be followed from one to the next."""
         self.found.messages.clear()
         self.found.losses.clear()
+        self.found.harmless.clear()
         self._unpacking = Unpacking(self.found.size)
         for start, chunk in self._marked():
             self._unpack(chunk, start)
@@ -281,7 +310,7 @@ def _put_in_order(found: Salvage) -> None:
             f"{counted(twice, 'record is', 'records are')} in the file twice; the first of each counts."
         )
     elif ordered != found.messages:
-        found.losses.append(
+        found.note_harmless(
             "Blocks of the file were out of order; their records are read in the order of their numbers."
         )
     found.messages[:] = ordered

@@ -169,6 +169,7 @@ EventKind: TypeAlias = Literal[
     "block",
     "stop",
     "opening",
+    "loss",
 ]
 
 
@@ -192,7 +193,8 @@ class Event(LogRecord):
     doubt or a pause is about, or an exclusion by isiw and the inclusion that confirms its trial; `corrected` is what a
     correction says that the trial's values really were. `client` is the key of the client over HTTP that drives the
     session from a "client" on; None if it stated none. A "block" of an intervention begins with the next trial,
-    `late_s` after it was due [s]; a "stop" ends it for good, and an "opening" says which arm it had.
+    `late_s` after it was due [s]; a "stop" ends it for good, and an "opening" says which arm it had. A "loss" is of
+    records that were lost when the log was continued; its `trial` is the last stimulus that had been delivered.
     """
 
     kind: EventKind

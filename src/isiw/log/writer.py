@@ -16,13 +16,16 @@ import tomli_w
 from mcap.writer import Writer
 from pydantic_core import PydanticSerializationError
 
+from isiw.checks import MOST_TRIALS
 from isiw.errors import InvalidValueError, LogError, error_text, os_errors
 from isiw.files import beside
+from isiw.log.codes import require_one_spelling
 from isiw.log.durable import DurableFile, begun, claimed, keep_damaged
 from isiw.log.headers import AnyHeader, ThresholdHeader
 from isiw.log.moments import boot_id
 from isiw.log.names import COPYING, own_file, require_free, require_unchanged
 from isiw.log.places import Fingerprint, log_of, part_of
+from isiw.log.records import MOST_LOSSES, Records
 from isiw.log.salvage import Salvage, salvage_file
 from isiw.log.schema import (
     ANNOUNCEMENT,
@@ -30,6 +33,7 @@ from isiw.log.schema import (
     CONFIGURATION,
     KINDS,
     Event,
+    EventKind,
     Message,
     Record,
     Waveform,
@@ -133,6 +137,7 @@ class LogWriter:
         target = Path(path)
         with os_errors(LogError, "the log cannot be created", target, "Make room, or choose another path."):
             require_free(target)
+            require_one_spelling(target.parent, header)
             with begun(beside(target), target) as file:
                 log = cls(target, file)
                 log.begin(header)
@@ -176,6 +181,8 @@ class LogWriter:
             self._copy(message)
             if is_of_isiw(message.topic):  # what a damaged byte costs is then a trial, as in a log that a session wrote
                 self._writer.flush()
+        if salvage.losses:
+            self.append(_damage(salvage))
         if as_resumed is not None:
             self.append(as_resumed)
         self.sync()
@@ -323,6 +330,13 @@ class LogWriter:
                 self._writer.add_metadata(f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic})
             self._channels[topic] = number
         return self._channels[topic]
+
+
+def _damage(salvage: Salvage) -> Event:
+    """What a continued log had lost, as an event: its copy has no gap by which that would show."""
+    last = min(Records.of(salvage).delivered, MOST_TRIALS) - 1
+    kind: EventKind = "loss" if salvage.lost_records else "note"
+    return Event(kind=kind, trial=None if last < 0 else last, text=" ".join(salvage.losses[:MOST_LOSSES]))
 
 
 _LAST_ONLY: Final = frozenset({"/estimate", "/threshold/belief"})

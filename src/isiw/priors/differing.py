@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from isiw.errors import InvalidValueError
+from isiw.log.codes import is_same_person
 from isiw.log.record import SessionRecord, require_records
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import moved, recalled, too_far_apart_ms
@@ -76,7 +77,7 @@ def _edges(record: SessionRecord) -> FloatArray | None:
 
 def _difference(first: _Session, second: _Session) -> Difference:
     (one, one_ms), (other, other_ms) = first, second
-    same = bool(one.header.subject) and one.header.subject == other.header.subject
+    same = is_same_person(one.header.subject, other.header.subject)
     if one_ms is None or other_ms is None:
         which = " and ".join(record.path.name for record, edges_ms in (first, second) if edges_ms is None)
         nothing = f"There is probably no window, or too little was measured: {which}"

@@ -15,6 +15,7 @@ import isiw
 from isiw.checks import MOST_OF_A_KIND, Checked, share, whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, LogError
+from isiw.log.codes import spelling
 from isiw.log.reader import ThresholdRecord
 from isiw.log.record import SessionRecord, read_any
 from isiw.log.salvage import salvage
@@ -205,7 +206,7 @@ def learn(
     prior = Prior(ProfilePrior().after(conditioning))
     posteriors = []
     for record in records:
-        posteriors.append(recalled(record, prior, given=given.pop(record.header.subject, ())))
+        posteriors.append(recalled(record, prior, given=given.pop(spelling(record.header.subject), ())))
         on_done(record)
     for number, pulses in enumerate(given.values()):
         posteriors.append(after_pulses(_OF_CURVES.begin(space, seed + number), pulses))
@@ -237,7 +238,7 @@ def _pulses_of_people(searches: Sequence[ThresholdRecord]) -> dict[str, tuple[Tr
                 got=str(record.path),
                 remedy="Leave it out: its person may be another log's.",
             )
-        people.setdefault(record.header.subject, []).append(record)
+        people.setdefault(spelling(record.header.subject), []).append(record)
     return {subject: given_pulses(sorted(own, key=lambda one: one.header.created)) for subject, own in people.items()}
 
 
@@ -259,7 +260,7 @@ def _require_different(
     hashes = [session.sha256 for session in sessions]
     _require_once(read, hashes, "two logs are the same", "Name it once.")
     if not again:
-        subjects = [record.header.subject for record in records]
+        subjects = [spelling(record.header.subject) for record in records]
         remedy = "Leave one out, or count each session as a person of its own: again=True, or --again."
         _require_once(records, subjects, "two logs are of the same person, or do not say of whom", remedy)
     require_each_once(records)

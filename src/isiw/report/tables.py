@@ -200,11 +200,15 @@ def _remark(trial: Trial, first: StimulusWords) -> str:
 
 def lost_rows(record: SessionRecord) -> list[tuple[int, str, str]]:
     """Trials that do not count: number, what was asked, and why; those of unknown outcome too."""
-    texts = {event.trial: event.text for event in record.events if event.kind == "exclusion"}
-    said = {number: f"excluded by the operator: {text}".rstrip(": ") for number, text in texts.items()}
+    excluded = {event.trial: event for event in record.events if event.kind == "exclusion"}
+    said = {number: f"excluded by {_judge(event)}: {event.text}".rstrip(": ") for number, event in excluded.items()}
     lost = [trial for trial in (*record.table, *record.unknown_trials) if not trial.counts]
     why = {t.index: str(t.reason or said.get(t.index, "excluded by the operator")) for t in lost}
     return sorted((t.index, asked(t, record.header.stimulus), why[t.index]) for t in lost)
+
+
+def _judge(exclusion: Event) -> str:
+    return "the operator" if exclusion.finding is None else "isiw"
 
 
 def event_rows(record: SessionRecord) -> list[tuple[str, str, str]]:
@@ -222,12 +226,12 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
     before = record.header.given_before
     most = f"{limits.max_pulses}" + (f", with {before} before the session" if before else "")
     unknown = sum(trial.reason is Kind.OUTCOME_UNKNOWN for trial in record.table) + len(record.unknown)
-    shortest_s = _shortest_s(record)
+    shortest = _shortest(record)
     runs = (len(list(run)) for is_lost, run in groupby(t.reason is not None for t in record.table) if is_lost)
     return [
         Counted("stimuli delivered", f"{record.given}", f"at most {most}" if kept else ""),
         Counted("of them with an unknown outcome", f"{unknown}", ""),
-        Counted("shortest time between two stimuli", "not known" if shortest_s is None else f"{shortest_s:.2f} s",
+        Counted("shortest time between two stimuli", shortest,
                 f"at least {limits.iti_s:g} s" if kept else ""),
         Counted("ISIs commanded", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms" if kept else ""),
         Counted("most mistrials in a row", f"{max(runs, default=0)}",
@@ -239,15 +243,27 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
     ]  # fmt: skip
 
 
-def _shortest_s(record: SessionRecord) -> float | None:
-    """Between two intents of one run of the session; one that was resumed has another clock."""
-    runs: list[list[float]] = [[]]
+def _shortest(record: SessionRecord) -> str:
+    """Within a run of the session by its clock; over a resumption, which has another one, by the computer's."""
+    runs: list[list[Intent]] = [[]]
     for entry in record.history:
         if isinstance(entry, Intent):
-            runs[-1].append(entry.t_s)
+            runs[-1].append(entry)
         elif isinstance(entry, Event) and entry.kind == "refused" and runs[-1]:
             runs[-1].pop()
         elif isinstance(entry, Event) and entry.kind == "resume":
             runs.append([])
-    gaps = [after - before for run in runs for before, after in pairwise(run)]
-    return min(gaps) if any(gap > 0 for gap in gaps) else None
+    runs = [run for run in runs if run]
+    gaps_s = [after.t_s - before.t_s for run in runs for before, after in pairwise(run)]
+    over_s = [_onset_s(record, after[0]) - _onset_s(record, before[-1]) for before, after in pairwise(runs)]
+    known_s = [] if record.header.device.simulated else [gap_s for gap_s in over_s if gap_s > 0]
+    if not any(gap_s > 0 for gap_s in gaps_s):
+        gaps_s = []
+    left_out = "" if len(known_s) == len(over_s) else "; across a resumption not known"
+    return f"{min(*gaps_s, *known_s, math.inf):.2f} s{left_out}" if gaps_s or known_s else "not known"
+
+
+def _onset_s(record: SessionRecord, intent: Intent) -> float:
+    """When a stimulus was about to be delivered, since the first one [s]; a clock that was set back tells nothing."""
+    onset = record.onsets.get(intent.trial)
+    return math.nan if onset is None else onset.onset_s

@@ -55,7 +55,7 @@ def estimate_again(
     last = record.table[-1].index
     said = f"Estimated again with isiw {isiw.__version__} from the trials as they count now."
     with LogWriter.continuing(path, salvaged, record.header) as log:
-        log.append(Event(kind="note", trial=last, text=" ".join([said, *record.losses])))
+        log.append(Event(kind="note", trial=last, text=said))
         log.append(estimate_record(made, last, made.decision(), None))
 
 
@@ -125,5 +125,3 @@ def _judge(path: str | Path, verdict: Callable[[TrialTable, Sequence[Event]], Ev
         record.require_read()
     with LogWriter.continuing(path, salvaged, record.header) as log:
         log.append(event)
-        if record.losses:
-            log.append(Event(kind="fault", trial=event.trial, text=" ".join(record.losses)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any, Final
@@ -29,8 +30,9 @@ def given_pulses(records: Sequence[ThresholdRecord]) -> tuple[Trial, ...]:
             that of the one before.
 
     Raises:
-        InvalidValueError: a search for the hot spot, or one without a threshold.
+        InvalidValueError: a search for the hot spot, one without a threshold, or two logs of one search.
     """
+    _require_each_once(records)
     trials: list[Trial] = []
     threshold_pct_mso: float | None = None
     for record in records:
@@ -54,6 +56,19 @@ def given_pulses(records: Sequence[ThresholdRecord]) -> tuple[Trial, ...]:
         first = len(trials)
         trials += [_lost(first + n) for n in range(len(record.unknown))]
     return tuple(trials)
+
+
+def _require_each_once(records: Sequence[ThresholdRecord]) -> None:
+    """Raise if two logs are of one search, such as a log and its copy: its pulses would count twice."""
+    for first, second in itertools.combinations(records, 2):
+        both = list(zip(first.intents, second.intents, strict=False))
+        if first.header.created == second.header.created and both and all(one == other for one, other in both):
+            raise InvalidValueError(
+                "two logs are of the same search",
+                got=f"{first.path} and {second.path}",
+                expected="each search once",
+                remedy="Leave one out.",
+            )
 
 
 def _trial(number: int, pulse: PulseOutcome, threshold_pct_mso: float) -> Trial:

@@ -77,6 +77,14 @@ def replay(
             expected=str(record.header.space),
             remedy="Make it with space=isiw.read_session(LOG).header.space.",
         )
+    seed = record.header.strategy.seed
+    if verify and strategy.seed != seed:  # by chance it may have asked the same so far
+        raise StrategyError(
+            "the strategy has another seed than the session",
+            got=strategy.seed,
+            expected=str(seed),
+            remedy=f"Make it with seed={seed}.",
+        )
     learned: list[Trial] = []
     changes: list[int] = []
     differing: list[int] = []
@@ -330,4 +338,4 @@ def _resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Ev
     if len(changed_after(record.events)) > MOST_NOTED:  # earlier versions took more
         sentences.append(f"{MANY_CHANGES}")
     last = len(replayed.trials) - 1 if replayed.trials else None
-    return Event(kind="resume", trial=last, text=" ".join((*sentences, *record.losses)))
+    return Event(kind="resume", trial=last, text=" ".join(sentences))

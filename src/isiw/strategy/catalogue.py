@@ -151,6 +151,12 @@ def list_settings(name: str = "default") -> tuple[DescribedSetting, ...]:
     return described(settings_for(name))
 
 
+def _meant(name: object) -> str:
+    """The way to name a function of one's own, if that may be meant."""
+    module, dot, function = name.rpartition(".") if isinstance(name, str) else ("", "", "")
+    return f'A function of your own is named with a colon, in a study: "{module}:{function}".' if dot else ""
+
+
 def settings_for(name: str, **settings: Any) -> Settings:
     """Settings of a named strategy, checked."""
     if not isinstance(name, str) or name not in _CATALOGUE:
@@ -158,7 +164,7 @@ def settings_for(name: str, **settings: Any) -> Settings:
             "unknown strategy",
             got=name,
             expected=", ".join(_CATALOGUE),
-            remedy=did_you_mean(name, _CATALOGUE) or "isiw strategies says what each of them does.",
+            remedy=_meant(name) or did_you_mean(name, _CATALOGUE) or "isiw strategies says what each of them does.",
         )
     entry = _CATALOGUE[name]
     usual: Settings = pkgutil.resolve_name(entry.family)

@@ -110,6 +110,13 @@ def test_a_threshold_beyond_the_range_is_no_number(method: Callable[[], BayesThr
     assert "above the highest intensity" in found.reason
 
 
+def test_a_search_that_ends_with_a_threshold_beyond_the_range_does_not_call_it_known() -> None:
+    pulses = [Pulse(70, response=False)] * 8 + [Pulse(70, response=True)]
+    ended = BayesThreshold(stop_sd_pct_mso=10.0).decision(pulses[4:], IntensityRange(20, 70))
+    assert ended.stop
+    assert ended.reason.startswith("The threshold is probably above the highest intensity, 70 % MSO")
+
+
 @pytest.mark.parametrize(
     "wrong",
     [

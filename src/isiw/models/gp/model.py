@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from isiw.checks import Checked, Positive, whole
+from isiw.checks import Checked, SmallestAmplitude, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
@@ -215,7 +215,7 @@ class GaussianProcess(Checked):
     transform: Transform = "log"
     floor: FloorTreatment = field(default_factory=FloorTreatment, metadata={"spread": True})
     samples: Annotated[int, partial(whole, least=2)] = 256
-    detection_limit_mv: Positive = 0.005
+    detection_limit_mv: SmallestAmplitude = 0.005
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from isiw.checks import Checked, Positive, whole
+from isiw.checks import Checked, SmallestAmplitude, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.excess import least_excess_mv
@@ -51,8 +51,8 @@ class ParametricModel(Checked):
     samples: Annotated[int, partial(whole, least=2)] = 512
     effort: Effort = field(default_factory=Effort)
     chains: Chains = field(default_factory=Chains)
-    detection_limit_mv: Positive = 0.005
-    response_threshold_mv: Positive = 0.02
+    detection_limit_mv: SmallestAmplitude = 0.005
+    response_threshold_mv: SmallestAmplitude = 0.02
 
     def program(self, space: DesignSpace) -> WindowProgram:
         """The Pyro program of one person."""

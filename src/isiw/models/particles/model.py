@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from isiw.change import AGAINST_A_CURVE, Misfit
-from isiw.checks import MOST_OF_A_KIND, Checked, NonNegative, Positive, Share, whole
+from isiw.checks import MOST_OF_A_KIND, Checked, NonNegative, Share, SmallestAmplitude, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import Later
@@ -58,9 +58,9 @@ class ParticleModel(Checked):
     particles: Annotated[int, partial(whole, least=2, most=MOST_OF_A_KIND)] = 1000
     thinned: Annotated[int, partial(whole, least=1, most=MOST_OF_A_KIND)] = 192
     moves: Moving = field(default_factory=Moving)
-    detection_limit_mv: Positive = 0.005
+    detection_limit_mv: SmallestAmplitude = 0.005
     amplitude_step_mv: NonNegative | None = None
-    response_threshold_mv: Positive = 0.02
+    response_threshold_mv: SmallestAmplitude = 0.02
     unusual_kept: Share = 0.2
 
     @cached_property

@@ -307,6 +307,9 @@ class BayesThreshold(Checked):
         if len(sides) == 1 and (side := sides.pop()):
             return StopKind.THRESHOLD.stop(f"The whole 90 % interval of the threshold is {side}.")
         sd = _sd(posterior)
+        if sd <= self.stop_sd_pct_mso and (side := space.beyond(_quantile(posterior, 0.5))):
+            wider = "Begin a new search with a wider range, if that is safe for this person."
+            return StopKind.THRESHOLD.stop(f"The threshold is probably {side}, to ± {sd:.1f} % MSO (SD). {wider}")
         if sd <= self.stop_sd_pct_mso:
             return StopKind.THRESHOLD.stop(f"The threshold is known to ± {sd:.1f} % MSO (SD).")
         if len(pulses) >= self.max_pulses:

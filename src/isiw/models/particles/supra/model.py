@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Annotated
 
-from isiw.checks import MOST_OF_A_KIND, Checked, Positive, whole
+from isiw.checks import MOST_OF_A_KIND, Checked, SmallestAmplitude, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.models.particles.posterior import SwarmPosterior, singles
@@ -40,8 +40,8 @@ class SupraModel(Checked):
     particles: Annotated[int, partial(whole, least=2, most=MOST_OF_A_KIND)] = 2000
     thinned: Annotated[int, partial(whole, least=1, most=MOST_OF_A_KIND)] = 192
     moves: Moving = field(default_factory=Moving)
-    detection_limit_mv: Positive = 0.005
-    response_threshold_mv: Positive = 0.02
+    detection_limit_mv: SmallestAmplitude = 0.005
+    response_threshold_mv: SmallestAmplitude = 0.02
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> SupraPosterior:
         """The posterior before the first trial."""
