@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.record import SessionRecord
 from isiw.sweeps import Channel
 from isiw.text.named_code import library
@@ -30,12 +31,7 @@ _EVENT_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "trial_type": ("", "sweep: a trial's waveforms; and in it {valve}{0.name}: the {0.moment}, tms: the {0.pulse}"),
     "trial": ("", "the number of the trial"),
     "condition": ("", "paired, TMS alone or {0.alone}; unknown if its record is lost"),
-    "commanded_isi_ms": ("ms", "the commanded ISI; none for a control trial"),
-    "isi_ms": ("ms", "the realised ISI"),
-    "status": ("", "accepted, or mistrial: nothing is learnt from it"),
-    "reason": ("", "why it is a mistrial"),
-    "excluded": ("", "whether an operator excluded it afterwards"),
-    "mep_mv": ("mV", "peak-to-peak amplitude of the MEP"),
+    **{name: TRIAL_COLUMNS[name] for name in ("commanded_isi_ms", "isi_ms", "status", "reason", "excluded", "mep_mv")},
     "session_s": ("s", "when the trial was, since the first stimulus of the log"),
 }
 _SHORTEST_RECORD_S: Final = 1e-4

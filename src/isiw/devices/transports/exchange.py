@@ -299,13 +299,13 @@ def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:
     """An instance of a dataclass."""
     if isinstance(table, kind):
         return table
-    if not isinstance(table, Mapping):
-        raise InvalidValueError(f"{what} must be a table", got=table)
     parameters = inspect.signature(kind)
+    remedy = f"Its keys are {', '.join(parameters.parameters)}."
+    if not isinstance(table, Mapping):
+        raise InvalidValueError(f"{what} must be a table", got=table, remedy=remedy)
     try:
         given = parameters.bind(**table)
     except TypeError as error:
-        remedy = f"Its keys are {', '.join(parameters.parameters)}."
         raise InvalidValueError(f"the table {what}: {error}", got=dict(table), remedy=remedy) from error
     return kind(*given.args, **given.kwargs)
 

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from string import Formatter
-from typing import Annotated, Final, TypeAlias
+from typing import Annotated, Any, Final, TypeAlias
 from urllib.parse import urlsplit
 
 from isiw.checks import Checked, Positive, Text, number
@@ -221,13 +221,9 @@ _GROUPS: Final = {
 """What an answer may say besides its sequence number."""
 
 
-def _command(what: str, value: object) -> LineExchange:
+def _command(what: str, value: Any) -> LineExchange:
     """A command of the table, which holds nothing, and whose answer says nothing, that has no meaning there."""
     name = what.rpartition(".")[2]
-    if not isinstance(value, Mapping | LineExchange):
-        raise InvalidValueError(
-            f"the command {name} must be a table", got=value, expected='{ send = "…", reply = "…" }'
-        )
     exchange = from_table(LineExchange, value, f"commands.{name}")
     rules = (
         ("command", exchange.fields, _FIELDS.get(name, _NONE)),
@@ -264,9 +260,7 @@ class LineHeartbeat(Checked):
         LineExchange(self.send.replace("{sequence}", "1"), "")
 
 
-def _heartbeat(what: str, value: object) -> LineHeartbeat:
-    if not isinstance(value, Mapping | LineHeartbeat):
-        raise InvalidValueError(f"{what} must be a table", got=value, expected='{ send = "…", every_s = 0.1 }')
+def _heartbeat(what: str, value: Any) -> LineHeartbeat:
     return from_table(LineHeartbeat, value, what)
 
 
