@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,62 +10,16 @@ from typing import Any, Final, Literal
 from isiw.checks import Checked, Natural, NonNegative, Positive, Text, choice
 from isiw.design import missing_reference
 from isiw.errors import InvalidValueError
+from isiw.existing.words import COLUMNS, MARKS
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.text.toml_files import checked, read_toml
 from isiw.types import Reference
 
 ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µs": 1e-3, "μs": 1e-3}
 EMG_UNITS: Final[Mapping[str, float]] = {**EMG_UNITS_MV, "nV": 1e-6}  # in mV
-_WORDS: Final = {
-    "ms": "ms msec msecs millisec millisecond milliseconds millisekunden",
-    "s": "s sec secs second seconds sekunden",
-    "us": "us µs μs microsecond microseconds",
-    "V": "v volt volts",
-    "mV": "mv mvolt mvolts millivolt millivolts",
-    "uV": "uv µv μv microv uvolt uvolts µvolt µvolts microvolt microvolts mikrovolt",
-    "nV": "nv nvolt nanovolt nanovolts",
-    "samples": "sample samples frames",
-    "mV·ms": "mvms mv*ms mv·ms uvms uv*ms uv·ms µvms µv*ms µv·ms μv·ms",  # of areas, and of no amplitude
-    "%": "%",
-}
-UNIT_WORDS: Final[Mapping[str, str]] = {word: unit for unit, words in _WORDS.items() for word in words.split()}
-"""Units as files write them, in lower case."""
-
-_NAMES: Final = {
-    "isi": "isi realisedisi isirealised actualisi interstimulusinterval interpulseinterval ipi "
-           "interstimulusintervall interval delay soa intervall reizabstand abstand verzögerung",
-    "mep": "mep mepamplitude mepamp mepp2p meppp mepptp meppeaktopeak mepsize ptpmep mepspitzespitze amplitude "
-           "peaktopeak peaktopeakamplitude emgpeaktopeak p2pamplitude ptpamplitude p2p ptp amp spitzespitze",
-    "asked": "commandedisi askedisi nominalisi targetisi plannedisi isicommanded isinominal sollisi sollintervall",
-    "isi_sd": "isisd",
-    "background": "backgroundrms background prestimrms rmsbackground baselinerms hintergrund",
-    "status": "status accepted accept valid include included keep good gültig verwertbar",
-    "exclude": "excluded exclude rejected reject bad artefact artifact ausschluss ausgeschlossen verworfen "
-               "artefakt",
-    "reason": "reason grund",
-    "tap_alone": "tapalone",
-    "intensity": "intensitypctrmt pctrmt intensityrmt percentrmt intensitypercentrmt",
-    "subject": "subject subjectid participant participantid subj person patient sub proband probandin "
-               "versuchsperson vp teilnehmer teilnehmerin id",
-    "day": "day visit session sessionid ses sitzung termin messtag",
-    "condition": "condition trialtype stimulus type bedingung reizart",
-    "block": "block run",
-    "order": "trial trialnumber trialno trialnr index onset time durchgang uhrzeit",
-    "date": "date recordingdate datum",
-}  # fmt: skip
-COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {key: tuple(names.split()) for key, names in _NAMES.items()}
-"""By what they are called in letters alone, the columns that are found without being named; the first name wins."""
-MARKERS: Final = ("pulse", "tap", "valve", "alone")
+MARKERS: Final = tuple(MARKS)
 CHANNELS: Final = ("emg", "acceleration", "events", *MARKERS)
 """What columns and arrays of a recording hold: those of `MARKERS` are triggers, that of events has texts."""
-
-
-def letters(name: str) -> str:
-    """A column's name in letters alone, without its unit."""
-    words = re.findall(r"[^\W_]+", re.sub(r"[\[(][^][()]*[\])]", " ", name.casefold()))
-    while len(words) > 1 and (words[-1] in UNIT_WORDS or words[-1] == "in"):
-        words.pop()
-    return "".join(words)
 
 
 @dataclass(frozen=True)
@@ -161,9 +114,8 @@ def required_unit(layout: Layout, known: Mapping[str, float], said: str | None, 
     unit = layout.unit_of(known) or said
     if unit is None or unit not in known:
         units = "ms or s" if known is ISI_UNITS_MS else "mV, uV or V"
-        raise InvalidValueError(
-            f"the unit of {what} is not stated, or unknown", got=got, remedy=f"Say --unit with {units}."
-        )
+        what = f"the unit of {what} is not stated, or unknown"
+        raise InvalidValueError(what, got=got, remedy=f"Say --unit with {units}.")
     return unit
 
 
