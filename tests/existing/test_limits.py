@@ -16,9 +16,9 @@ from isiw.errors import InvalidValueError
 from isiw.existing import Delivered, Layout, ReadingLimits, doubts, read_people
 from isiw.existing.apart import Answer, read_answer, write_answer, write_error
 from isiw.existing.child import Gate, require_no_links
+from isiw.existing.layout import letters
 from isiw.existing.limits import LARGEST_FACTOR, require_file, seconds_for
 from isiw.existing.quantities import Columns, unit_said
-from isiw.existing.words import letters
 from isiw.sweeps import Channel
 from isiw.text.parsing import DoubledKeyError, once_each
 from isiw.text.sanitize import read_number

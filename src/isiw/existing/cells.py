@@ -15,7 +15,7 @@ from numbers import Real
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError
-from isiw.existing.words import WORDS, plain, unit_named
+from isiw.existing.layout import WORDS, plain, unit_named
 from isiw.lazy import pd
 
 _NUMBER: Final = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)

@@ -131,11 +131,9 @@ class Delivered:
 
     def _refuse_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> NoReturn:
         said = f"If they are in {fits[0]}, say --unit {fits[0]}; if" if fits else "If"
-        of_table, of_recording = (
-            f"column holds them, say --column {key}=NAME",
-            "channel holds the EMG, say --channel emg=NAME",
-        )
-        other = of_recording if self.sweeps else of_table
+        other = f"column holds them, say --column {key}=NAME"
+        if self.sweeps:
+            other = "channel holds the EMG, say --channel emg=NAME"
         what = f"the {what} of {self.named} cannot be in {stated}"
         raise InvalidValueError(what, got=got, remedy=f"{said} another {other}.")
 

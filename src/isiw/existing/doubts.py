@@ -15,8 +15,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, says_alone, times_of
 from isiw.existing.delivered import LONGEST_ISI_MS, Delivered
-from isiw.existing.layout import Layout
-from isiw.existing.words import WORDS, letters
+from isiw.existing.layout import WORDS, Layout, letters
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
@@ -135,10 +134,8 @@ def require_short(delivered: Delivered, layout: Layout) -> None:
     usual_ms = statistics.median(trial.isi_ms for trial in delivered.trials if trial.isi_ms is not None)
     if usual_ms > layout.longest_isi_ms:
         what, got = f"the ISIs of {delivered.source} are longer than those of paired stimulation", f"{usual_ms:g} ms"
-        remedy = (
-            "Are they in another unit (--unit), or numbers of samples, or times between trials? If they are right, "
-        )
-        remedy += "write longest_isi_ms = NUMBER into a layout."
+        remedy = "Are they in another unit (--unit), or numbers of samples, or times between trials? If they are "
+        remedy += "right, write longest_isi_ms = NUMBER into a layout."
         expected = f"at most {layout.longest_isi_ms:g} ms"
         raise InvalidValueError(what, got=f"{got} in the median", expected=expected, remedy=remedy)
 
@@ -203,19 +200,15 @@ def require_said(columns: Columns) -> None:
     isi, condition, paired = columns["isi"], columns["condition"], columns.paired
     both = [row for row in paired if columns.layout.alone is None and says_alone(condition.text(row), None)]
     if both and not all(says_alone(condition.text(row), None) for row in columns.rows):  # one word in all means nothing
-        remedy = (
-            "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it is a "
-        )
-        remedy += "pair, rename the column."
+        remedy = "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it is "
+        remedy += "a pair, rename the column."
         raise condition.refused(both[0], f"says TMS alone, and the ISI there is {isi.text(both[0])}", remedy)
     empty = [row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None]
     empty = [row for row in empty if "mep" not in columns.of or columns["mep"].number(row) is not None]
     if empty and "asked" not in columns.of:
         what = f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}"
-        remedy = (
-            "If these are TMS alone, say --alone with what stands in their place, or --alone '' for an empty cell; "
-        )
-        remedy += "if not, mark them in a column called exclude."
+        remedy = "If these are TMS alone, say --alone with what stands in their place, or --alone '' for an empty "
+        remedy += "cell; if not, mark them in a column called exclude."
         raise InvalidValueError(what, got=f"row {empty[0] + 1}", remedy=remedy)
 
 
@@ -238,10 +231,8 @@ def _require_one_kind(columns: Columns) -> None:
         if sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins):
             few = ", ".join(list(kinds)[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
             what = f"the column {name!r} of {isi.of} has several values at each ISI, and nothing is read of it"
-            remedy = (
-                f'Say --where "{name}={next(iter(kinds))}" for one of them, --where "{name}={ALL}" if all are to be '
-            )
-            remedy += f'analysed together, or --column "subject={name}" if they are people.'
+            remedy = f'Say --where "{name}={next(iter(kinds))}" for one of them, --where "{name}={ALL}" if all are to '
+            remedy += f'be analysed together, or --column "subject={name}" if they are people.'
             raise InvalidValueError(what, got=few, remedy=remedy)
 
 
@@ -254,9 +245,8 @@ def _require_isis(columns: Columns) -> None:
     numbered = any(isis_ms == list(range(first, first + len(paired))) for first in (0, 1))
     if "order" not in columns.of and len(paired) >= _FEWEST and numbered:
         what = f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows"
-        remedy = (
-            "Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called trial."
-        )
+        remedy = "Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called "
+        remedy += "trial."
         raise InvalidValueError(what, remedy=remedy)
     times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
     for odd in {min(times, default=0.0), max(times, default=0.0)}:
@@ -316,9 +306,8 @@ def _require_one_row_each(columns: Columns) -> None:
     are_whole = all(round(isi.number(row) or 0.0, 3).is_integer() for row in columns.paired)
     again = texts[:half] == texts[half:] and (meps[:half] == meps[half:] or not are_whole)  # as realised ISIs never do
     if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
-        what = (
-            f"the ISIs of {isi.of} come {max(times, 2)} times each, as if there was a row for each of several muscles, "
-        )
+        what = f"the ISIs of {isi.of} come {max(times, 2)} times each, as if there was a row for each of several "
+        what += "muscles, or each row twice"
         remedy = "Leave one row for each trial; if each row is one, number them in a column called trial."
         got = ", ".join(texts[: 2 * max(times, 2)])
-        raise InvalidValueError(f"{what}or each row twice", got=got, remedy=remedy)
+        raise InvalidValueError(what, got=got, remedy=remedy)

@@ -17,9 +17,8 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
 from isiw.existing.doubts import doubtful_words
-from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, Layout
+from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, WORDS, Layout, letters, unit_named
 from isiw.existing.quantities import require_one, unit_said
-from isiw.existing.words import COLUMNS, WORDS, letters, unit_named
 from isiw.lazy import pd, scipy
 from isiw.opening import opened
 from isiw.text.named_code import library

@@ -11,8 +11,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import says_alone
-from isiw.existing.layout import Layout
-from isiw.existing.words import MARKS, plain
+from isiw.existing.layout import MARKS, Layout, plain
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import FloatArray
@@ -120,9 +119,9 @@ def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout
         came_s = None if pulse.origin_s is None else round(pulse.origin_s, 9)
         shared = came_s is not None and came_s == last_came_s
         if taps > 1 or shared:
-            what = (
-                f"two pulses of {source} have one tap" if shared else f"{taps} taps of {source} come before one pulse"
-            )
+            what = f"two pulses of {source} have one tap"
+            if not shared:
+                what = f"{taps} taps of {source} come before one pulse"
             expected = f"one of each within {layout.longest_isi_ms:g} ms"
             remedy = "Leave out the events that mark no stimulus, such as a second edge, or give them another name."
             raise InvalidValueError(what, got=f"at {pulse.at_s:.3f} s", expected=expected, remedy=remedy)
@@ -162,9 +161,7 @@ def _with_the_unmarked(pulses: list[Pulse], layout: Layout, source: str) -> list
     if layout.unmarked is None:
         what = f"{counted(len(unmarked), 'pulse')} of {len(pulses)} in {source} have no tap within "
         what += f"{layout.longest_isi_ms:g} ms before them, and nothing says whether none came or its marker is missing"
-        remedy = (
-            "Say --unmarked alone if they are TMS alone, or --unmarked lost to leave them out; or name the events that "
-        )
-        remedy += "mark TMS alone: --marker alone=NAME."
+        remedy = "Say --unmarked alone if they are TMS alone, or --unmarked lost to leave them out; or name the events "
+        remedy += "that mark TMS alone: --marker alone=NAME."
         raise InvalidValueError(what, got=f"the first at {unmarked[0].at_s:.3f} s", remedy=remedy)
     return [replace(one, lost=layout.unmarked == "lost") if one in unmarked else one for one in pulses]

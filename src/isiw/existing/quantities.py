@@ -11,8 +11,18 @@ from typing import Any, Final
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing import doubts
 from isiw.existing.cells import Column, says_alone, with_decimals, without_unit_in_cells
-from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, Layout, required_unit
-from isiw.existing.words import COLUMNS, UNIT_WORDS, WORDS, letters, plain, unit_named
+from isiw.existing.layout import (
+    COLUMNS,
+    EMG_UNITS,
+    ISI_UNITS_MS,
+    UNIT_WORDS,
+    WORDS,
+    Layout,
+    letters,
+    plain,
+    required_unit,
+    unit_named,
+)
 from isiw.findings import Kind
 from isiw.lazy import pd
 
@@ -63,9 +73,8 @@ class Columns:
             if key in needed and held[key] is None:
                 what = f"no column of {source} is known to hold the {held_ones}"
                 got = ", ".join(name for name in names if name.strip()) or "no names"
-                remedy = (
-                    f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file (--layout).'
-                )
+                remedy = f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file '
+                remedy += "(--layout)."
                 raise InvalidValueError(what, got=got, remedy=remedy)
         columns, of_units = dict[str, Column](), set[str]()
         for key, name in held.items():

@@ -17,10 +17,9 @@ from isiw.existing.doubts import is_rectified, require_said
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
-from isiw.existing.layout import EMG_UNITS, MARKERS, Layout, required_unit
+from isiw.existing.layout import EMG_UNITS, MARKERS, Layout, required_unit, unit_named
 from isiw.existing.markers import Pulse, marked, names_of, pulses_of
 from isiw.existing.quantities import Columns, isis_of, require_one, unit_said
-from isiw.existing.words import unit_named
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
@@ -176,10 +175,8 @@ def _require_same(what: str, isi_ms: float | None, seen_s: float | None) -> None
     if isi_ms is None or seen_s is None or abs(1e3 * seen_s - isi_ms) > _APART_MS:
         got = "TMS alone" if isi_ms is None else f"{isi_ms:g} ms"
         expected = "no tap, by the events" if seen_s is None else f"{1e3 * seen_s:.1f} ms, by the events"
-        what, remedy = (
-            f"the ISI of {what} is not that of the events in its sweep",
-            "Correct one of them, or leave one out.",
-        )
+        what = f"the ISI of {what} is not that of the events in its sweep"
+        remedy = "Correct one of them, or leave one out of the file."
         raise InvalidValueError(what, got=got, expected=expected, remedy=remedy)
 
 

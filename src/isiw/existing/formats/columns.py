@@ -14,9 +14,8 @@ from isiw.errors import InvalidValueError
 from isiw.existing import frames
 from isiw.existing.cells import Column, is_missing, with_decimals
 from isiw.existing.formats.contents import Contents, Track, events_of, parted, timed
-from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, Layout
+from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, Layout, unit_named
 from isiw.existing.quantities import require_one, unit_said
-from isiw.existing.words import unit_named
 from isiw.lazy import pd
 from isiw.types import FloatArray
 

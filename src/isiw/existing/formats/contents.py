@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.words import unit_named
+from isiw.existing.layout import unit_named
 from isiw.lazy import pd
 from isiw.types import FloatArray, IntArray
 
@@ -174,10 +174,8 @@ class Track:
             falls += (at_s + np.flatnonzero(turns < 0) / self.rate_hz).tolist()
         spans_s = np.diff(sorted([*rises, *falls]))
         if len(spans_s) > 2 and 0.5 < np.median(spans_s[0::2]) / np.median(spans_s[1::2]) < 2:
-            what = (
-                f"the trigger {self.name!r} is about as long at one level as at the other, so that it cannot be known "
-            )
-            what += "which of its edges are stimuli"
+            what = f"the trigger {self.name!r} is about as long at one level as at the other, so that it cannot be "
+            what += "known which of its edges are stimuli"
             got = f"{len(rises)} edges up and {len(falls)} down"
             remedy = "Export events in its place, or a trigger that is short for each stimulus."
             raise InvalidValueError(what, got=got, remedy=remedy)

@@ -11,8 +11,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing import frames, quantities
 from isiw.existing.formats import columns
 from isiw.existing.formats.contents import Contents, Track, parted
-from isiw.existing.layout import EMG_UNITS, Layout
-from isiw.existing.words import WORDS, letters
+from isiw.existing.layout import EMG_UNITS, WORDS, Layout, letters
 from isiw.lazy import pd
 
 
