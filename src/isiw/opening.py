@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import stat
+from io import BufferedReader
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Final, cast
 
 _LOG: Final = b"\x89MCAP"
 """What every log begins with."""
@@ -28,3 +30,9 @@ def is_mcap(path: Path) -> bool:
         return False
     with opened(path) as file:
         return file.read(len(_LOG)) == _LOG
+
+
+def hash_of(path: Path) -> str:
+    """The SHA-256 of a file."""
+    with opened(path) as file:
+        return hashlib.file_digest(cast("BufferedReader", file), "sha256").hexdigest()

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from isiw.existing import Layout, ReadingLimits, reading
-from isiw.existing.answer import Answer
+from isiw.existing.apart import Answer
 
 looking = importlib.import_module("isiw.existing.look")  # the module; isiw.existing.look is its function
 

@@ -41,7 +41,7 @@ from existing.writers import (
 from isiw.errors import IsiwError
 from isiw.existing.delivered import Delivered
 from isiw.existing.formats import xdf
-from isiw.existing.formats.stamps import clocked
+from isiw.existing.formats.contents import clocked
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
 
@@ -126,12 +126,12 @@ def test_a_pause_of_spike2_is_a_gap(tmp_path: Path) -> None:
 def test_samples_that_come_late_for_good_come_after_a_gap_and_jitter_is_none() -> None:
     rng = np.random.default_rng(1)
     times_s = np.arange(20_000, dtype=np.float64) * (1 / 1000 + 2e-8) + np.repeat(rng.normal(0.0, 0.003, 625), 32)
-    found = clocked(times_s, 1000.0, "a stream")
-    assert len(found.stretches) == 1
-    assert found.rate_hz == pytest.approx(1 / (1 / 1000 + 2e-8), rel=5e-5)
-    late = clocked(times_s + 0.05 * (np.arange(20_000) >= 9_000), 1000.0, "a stream")
-    assert [stretch.first for stretch in late.stretches] == [0, 9_000]
-    assert late.stretches[1].start_s == pytest.approx(9_000 * (1 / 1000 + 2e-8) + 0.05, abs=5e-4)
+    rate_hz, stretches, _ = clocked(times_s, 1000.0, "a stream")
+    assert len(stretches) == 1
+    assert rate_hz == pytest.approx(1 / (1 / 1000 + 2e-8), rel=5e-5)
+    _, stretches, _ = clocked(times_s + 0.05 * (np.arange(20_000) >= 9_000), 1000.0, "a stream")
+    assert [stretch.first for stretch in stretches] == [0, 9_000]
+    assert stretches[1].start_s == pytest.approx(9_000 * (1 / 1000 + 2e-8) + 0.05, abs=5e-4)
     with pytest.raises(IsiwError, match="do not ascend"):
         clocked(np.zeros(10), 1000.0, "a stream")
 

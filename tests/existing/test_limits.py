@@ -15,8 +15,8 @@ import pytest
 from isiw.devices.transports.exchange import read_number
 from isiw.errors import InvalidValueError
 from isiw.existing import Delivered, Layout, ReadingLimits, doubts, read_people
-from isiw.existing.answer import Answer, read_answer, write_answer, write_error
-from isiw.existing.gate import Gate, require_no_links
+from isiw.existing.apart import Answer, read_answer, write_answer, write_error
+from isiw.existing.child import Gate, require_no_links
 from isiw.existing.layout import letters
 from isiw.existing.limits import LARGEST_FACTOR, require_file, seconds_for
 from isiw.existing.quantities import Columns, unit_said

@@ -15,12 +15,12 @@ import isiw
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, InvalidValueError, LogError
 from isiw.existing.delivered import Delivered, codes_of
-from isiw.existing.gate import hash_of
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
 from isiw.existing.reading import read_people
 from isiw.files import folded, is_reserved
 from isiw.log.places import log_exists
+from isiw.opening import hash_of
 from isiw.visit import Visit
 
 if TYPE_CHECKING:  # a file is read, and perhaps refused, before what analyses it is loaded
@@ -123,11 +123,11 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
         return [one._replace(log=Path(output)) for one in people]
     days = [f"_day{day}" if (day := one.delivered.visit.day) else "" for one in people]
     stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]
-    times, found = Counter(map(folded, stems)), []  # names that are two here may be one file on other computers
-    for one, stem in zip(people, stems, strict=True):
-        refused = _no_log_of_its_own(stem, times[folded(stem)])
-        found.append(one._replace(log=Path(output) / f"{stem}.mcap", refused=refused))
-    return found
+    times = Counter(map(folded, stems))  # names that are two here may be one file on other computers
+    return [
+        one._replace(log=Path(output) / f"{stem}.mcap", refused=_no_log_of_its_own(stem, times[folded(stem)]))
+        for one, stem in zip(people, stems, strict=True)
+    ]
 
 
 def code_in_names(subject: str) -> str:

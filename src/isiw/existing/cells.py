@@ -15,22 +15,8 @@ from numbers import Real
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError
-from isiw.existing.layout import UNIT_WORDS
+from isiw.existing.layout import WORDS, plain, unit_named
 from isiw.lazy import pd
-
-_MISSING: Final = frozenset({"", "nan", "(null)", "na", "n/a", "none", "null", "<na>", "nat", "-", "--", ".", "?"})
-_YES: Final = frozenset({"1", "1.0", "true", "yes", "y", "x", "accepted", "accept", "ok", "good", "valid", "keep",
-                         "ja", "j", "gut", "gültig"})  # fmt: skip
-_NO: Final = frozenset({"0", "0.0", "false", "no", "n", "mistrial", "rejected", "reject", "bad", "invalid", "excluded",
-                        "nein", "schlecht", "ungültig"})  # fmt: skip
-ALONE: Final = frozenset({"tms alone", "tms only", "tms", "single", "single pulse", "single tms", "sp", "alone", "ts",
-                           "baseline", "control", "unconditioned", "unpaired", "ts alone", "ts only", "test",
-                           "test alone", "test only", "test pulse", "test stimulus", "no tap", "nur tms", "tms allein",
-                           "einzelpuls", "einzelreiz", "kontrolle", "ohne tap", "ohne schlag"})  # fmt: skip
-"""What a cell of ISIs says of TMS alone, hyphens and underscores as blanks."""
-TAP_ALONE: Final = frozenset({"tap alone", "tap only", "hit only", "hammer only", "no tms", "no pulse", "cs alone",
-                               "cs only", "conditioning alone", "conditioning only", "nur tap", "nur schlag",
-                               "tap allein", "ohne tms"})  # fmt: skip
 
 _NUMBER: Final = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
 _GROUPED: Final = {
@@ -50,7 +36,7 @@ _MANY: Final = 2**16  # so many texts are remembered: in a long table most cells
 def is_missing(cell: Any) -> bool:
     """True if a cell holds nothing."""
     if isinstance(cell, str):
-        return cell.strip().casefold() in _MISSING
+        return cell.strip().casefold() in WORDS["missing"]
     return cell is None or type(cell).__name__ in {"NAType", "NaTType"} or cell != cell  # noqa: PLR0124 - NaN
 
 
@@ -83,13 +69,7 @@ def says_alone(cell: Any, mark: str | None) -> bool:
         numbers = [{_value(word, sign) for sign in ".,"} - {math.nan} for word in words]
         if words[0] == words[1] or any(map(math.isfinite, numbers[0] & numbers[1])):
             return True
-    return isinstance(cell, str) and plain(cell) in ALONE
-
-
-@lru_cache(_MANY)
-def plain(text: str) -> str:
-    """A text in lower case, with blanks for hyphens and underscores."""
-    return " ".join(re.split(r"[\s_-]+", text.strip().casefold()))
+    return isinstance(cell, str) and plain(cell) in WORDS["alone"]
 
 
 @dataclass(frozen=True)
@@ -122,9 +102,9 @@ class Column:
         if is_missing(cell):
             return None
         word = str(cell).strip().casefold()
-        if word not in _YES | _NO:
+        if word not in WORDS["yes"] | WORDS["no"]:
             raise self.refused(row, "says neither yes nor no", "Use accepted and rejected, or 1 and 0.")
-        return word in _YES
+        return word in WORDS["yes"]
 
     def text(self, row: int) -> str:
         """The cell of a row as text; a whole number has no decimal sign."""
@@ -157,12 +137,10 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
             expected = f"{''.join(signs[key])!r}, as its numbers have"
             raise InvalidValueError(what, got=stated, expected=expected, remedy="Leave --decimal out, or correct it.")
         if usual is None and not signs[key] and (doubtful := _doubtful(column)):
-            raise InvalidValueError(
-                f"the {'comma' if ',' in doubtful else 'point'} in the column {column.name!r} of {column.of} may be a "
-                "decimal sign, or group thousands",
-                got=doubtful,
-                remedy="Say --decimal , or --decimal . to name the decimal sign.",
-            )
+            sign = "comma" if "," in doubtful else "point"
+            what = f"the {sign} in the column {column.name!r} of {column.of} may be a decimal sign, or group thousands"
+            remedy = "Say --decimal , or --decimal . to name the decimal sign."
+            raise InvalidValueError(what, got=doubtful, remedy=remedy)
         found[key] = replace(column, decimal=max(signs[key], key=",.".find, default=usual or "."))
     return found
 
@@ -189,10 +167,10 @@ def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:
     """A column whose cells all say the same unit, such as "12.5 ms", as one whose name says it."""
     texts = [cell for cell in cells if not is_missing(cell)]
     unit, *others = {_NUMBER_BEFORE.sub("", cell.casefold()) if isinstance(cell, str) else "" for cell in texts} or {""}
-    if others or unit not in UNIT_WORDS:
+    if others or (known := unit_named(unit)) is None:
         return name, cells
     bare = [cell if is_missing(cell) else cell.strip()[: -len(unit)].strip() for cell in cells]
-    return f"{name} ({UNIT_WORDS[unit]})", bare
+    return f"{name} ({known})", bare
 
 
 def dates_of(column: Column, rows: Iterable[int]) -> dict[int, dt.datetime]:

@@ -96,20 +96,19 @@ class Delivered:
         """The ISIs of the trials that count [ms], those of control trials left out."""
         return [trial.isi_ms for trial in self.trials if trial.told and trial.isi_ms is not None]
 
-    def space(self, step_ms: float = 1.0) -> DesignSpace:
-        """The range of the ISIs that were delivered, in whole steps."""
+    def space(self) -> DesignSpace:
+        """The range of the ISIs that were delivered, in whole ms."""
         isis_ms = self.isis_ms
         if not isis_ms:
             reasons = sorted({str(trial.reason) for trial in self.trials if trial.reason is not None})
             remedy = "A trial counts if it has an ISI and an amplitude, and if no column excludes it."
             raise InvalidValueError(f"no trial of {self.named} counts", got=", ".join(reasons) or None, remedy=remedy)
-        lowest, highest = round(min(isis_ms) / step_ms, 6), round(max(isis_ms) / step_ms, 6)  # of times in s, too
-        low, high = math.floor(lowest), math.ceil(highest)
+        low, high = math.floor(round(min(isis_ms), 6)), math.ceil(round(max(isis_ms), 6))  # of times in s, too
         if not 1 <= high - low < MOST_ISIS:
             what = f"the ISIs of {self.named} are {'all the same' if high == low else 'too far apart for a window'}"
             remedy = "A window is found among several ISIs. Which column holds them, and in which unit?"
             raise InvalidValueError(what, got=(min(isis_ms), max(isis_ms)), remedy=remedy)
-        return DesignSpace(low * step_ms, high * step_ms, step_ms, reference=self.reference)
+        return DesignSpace(float(low), float(high), reference=self.reference)
 
     def _require_units(self, isis_ms: Sequence[float], meps_mv: Sequence[float]) -> None:
         """Raise if ISIs and amplitudes are probably swapped, or in other units than is stated."""
@@ -117,11 +116,9 @@ class Delivered:
         longest_ms, usual_mv = max(map(abs, isis_ms)), statistics.median(seen) if seen else 0.0
         repeated = len(set(seen)) <= len(seen) / 2 and len(set(isis_ms)) > len(isis_ms) / 2
         if len(seen) >= 6 and repeated and usual_mv > statistics.median(map(abs, isis_ms)):
-            raise InvalidValueError(
-                f"the columns of {self.named} are probably swapped: the amplitudes repeat as ISIs do",
-                got=f"ISIs such as {isis_ms[0]:.4g} and amplitudes such as {seen[0]:.4g} mV",
-                remedy="Name them: --column isi=NAME --column mep=NAME.",
-            )
+            what = f"the columns of {self.named} are probably swapped: the amplitudes repeat as ISIs do"
+            got = f"ISIs such as {isis_ms[0]:.4g} and amplitudes such as {seen[0]:.4g} mV"
+            raise InvalidValueError(what, got=got, remedy="Name them: --column isi=NAME --column mep=NAME.")
         of_isis, of_meps = self.units
         if longest_ms != 0 and not 1 <= longest_ms <= LONGEST_ISI_MS:
             longest = longest_ms / ISI_UNITS_MS[of_isis]

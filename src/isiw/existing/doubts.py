@@ -15,7 +15,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, says_alone, times_of
 from isiw.existing.delivered import LONGEST_ISI_MS, Delivered
-from isiw.existing.layout import Layout, letters
+from isiw.existing.layout import WORDS, Layout, letters
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
@@ -25,40 +25,33 @@ if TYPE_CHECKING:
     from isiw.existing.quantities import Columns
 
 ALL: Final = "*"  # what `where` says of a column whose values are to be analysed together
-_MEANS: Final = re.compile(r"means?|average|avg|median|mittel(wert)?|moyenne|\bn ?= ?\d+")
-_TITLES: Final = re.compile(r"\b(means?|averages?|averaged|avg|mittelwerte?)\b")
+_MEANS: Final = re.compile(
+    r"means?|average|avg|median|mittel(wert)?|moyen(ne)?s?|promedios?|\bmedi[ae]\b|gemiddelden?|\bn ?= ?\d+"
+)
+_TITLES: Final = re.compile(
+    r"\b(means?|averages?|averaged|avg|mittelwerte?|moyennes?|promedios?|medi[ae]|gemiddelden?)\b"
+)
 """What the names of files and sheets, and titles, say of means."""
-_SPREADS: Final = frozenset({"sd", "std", "stdev", "stddev", "se", "sem", "stderr", "cv", "sds", "stdabw",
-                             "standarddeviation", "standarderror", "ci", "iqr", "var"})  # fmt: skip
-_SUMS: Final = frozenset({"sum", "total", "grand mean", "summe", "gesamt"})
-LEFT_OUT: Final = frozenset({"mistrial", "rejected", "reject", "bad", "invalid", "excluded", "exclude", "discard",
-                              "discarded", "artefact", "artifact", "outlier", "schlecht", "ungültig", "verworfen",
-                              "ausgeschlossen", "artefakt", "ausreißer"})  # fmt: skip
-"""What a remark says of a trial that does not count."""
 _ORIGINS: Final = {"impact": r"\b(valve|ventil|command)", "valve": r"\b(impact|hit|contact|aufprall)"}
 """What the name of ISIs that count from another event says."""
-_BESIDE: Final = frozenset({"mep", "amplitude", "of", "lower", "upper", "low", "high", "mv", "uv", "v", "95"})
-"""Words that may stand beside those of spreads."""
-_NUMBERS: Final = frozenset({"n", "count", "ntrials", "trials", "ntrial", "nobs", "nsweeps", "sweeps", "anzahl", "nmep",
-                             "nmeps", "naveraged", "averaged", "numberoftrials"})  # fmt: skip
 _BASES: Final = "(control|base|baseline|mean|unconditioned|kontrolle)"
 _RELATIVE: Final = re.compile(
-    r"%|\bper ?c(ent)?|\bpct\b|prozent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|\brel(ative|ativ)?\b|"
-    r"\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|\bdelta\b|[δΔ]|\bdiff|"
-    rf"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|([/÷]|\b(x|times|div|by|vs)\b) ?{_BASES}\b"
+    r"%|\bper ?c(ent)?|\bpct\b|pro[zc]ent|p(our|or)cent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|"
+    r"\brel(ati\w*)?\b|\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|"
+    r"\bdelta\b|[δΔ]|\bdiff|\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|[/÷] *mep\b|"
+    rf"([/÷]|\b(x|times|div|by|vs)\b) ?{_BASES}\b"
 )
-_OTHERWISE: Final = {
-    "mep": (
-        (_RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
-        (re.compile(r"\b(base|zero|0|onset)\w* ?(-|to)* ?peak|\bhalf\b|\barea\b|\bauc\b|\brms\b|integra|rectif|latenc"),
-         "are of another measure", "amplitudes from peak to peak"),
-        (re.compile(r"\bgain\b|amplified|verstärk"), "are multiplied", "amplitudes at the electrodes"),
-    ),
-    "isi": (
-        (re.compile(r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe)\b"),
-         "are numbers of something", "the intervals themselves, in ms or s"),
-    ),
-}  # fmt: skip
+_MEASURES: Final = (
+    r"\b(bas[ei]|zero|0|onset|null)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b|\b[aá]rea\b|\baire\b|fläche|"
+    r"\bauc\b|\brms\b|integra|rectif|latenc"
+)
+_OTHERWISE: Final = (
+    ("mep", _RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
+    ("mep", _MEASURES, "are of another measure", "amplitudes from peak to peak"),
+    ("mep", r"\bgain\b|amplified|verstärk", "are multiplied", "amplitudes at the electrodes"),
+    ("isi", r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe)\b",
+     "are numbers of something", "the intervals themselves, in ms or s"),
+)  # fmt: skip
 """What the name of a column says of its numbers if they are no amplitudes or ISIs, and what is expected."""
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
 _FEW: Final = 3
@@ -69,8 +62,8 @@ _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median
 
 
 def _words(name: str) -> str:
-    """A name in lower case, its words apart."""
-    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.replace("_", " ")).casefold()
+    """A name in lower case, its words apart; units such as mV are one."""
+    apart = re.sub(r"(?<=[a-z]{2})(?=[A-Z])", " ", name.replace("_", " ")).casefold()
     return re.sub("mep(?!s)", " mep ", apart)
 
 
@@ -81,8 +74,8 @@ def doubtful_words(text: str) -> list[str]:
 
 def require_of_kind(key: str, what: str, name: str, source: str) -> None:
     """Raise if a column's name says that its numbers are something else, whatever unit is stated."""
-    for pattern, are, expected in _OTHERWISE[key]:
-        if found := pattern.search(_words(name)):
+    for of, pattern, are, expected in _OTHERWISE:
+        if of == key and (found := re.search(pattern, _words(name))):
             what = f"the {what} of {source} in the column {name!r} {are}"
             remedy = f"Name the column that holds these: --column {key}=NAME."
             raise InvalidValueError(what, got=found[0].strip(), expected=expected, remedy=remedy)
@@ -91,8 +84,8 @@ def require_of_kind(key: str, what: str, name: str, source: str) -> None:
 def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source: str) -> None:
     """Raise if rows are means of several trials: their column says so, or their SDs or numbers are beside them."""
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
-    spreads = [name for name in others if set() < {*re.findall(r"\w+", _words(name))} - _BESIDE <= _SPREADS]
-    numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in _NUMBERS}
+    spreads = [name for name in others if _is_spread(name)]
+    numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in WORDS["numbers"]}
     whole = {name: all(text.isdigit() and int(text) > 1 for text in texts) for name, texts in numbers.items()}
     counted_in = [name for name, texts in numbers.items() if whole[name] and 2 * len({*texts}) <= len(texts)]
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
@@ -101,25 +94,29 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
     for name, cells in others.items():
         for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
             word = odd.strip().rstrip(":").casefold()
-            if word in _SPREADS | _SUMS or _MEANS.fullmatch(word):
+            if word in WORDS["spreads"] | WORDS["sums"] or _MEANS.fullmatch(word):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
     title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
     if title or _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
-        raise InvalidValueError(
-            f"the rows of {source} are means of several trials, by the column {mep.name!r}"
-            + "".join(f" beside {name!r}" for name in beside),
-            expected="a row for each trial, since the scatter of single trials says how sure a window is",
-            remedy="Export the single trials; if these are, rename the column.",
-        )
+        what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"
+        what += "".join(f" beside {name!r}" for name in beside)
+        expected = "a row for each trial, since the scatter of single trials says how sure a window is"
+        remedy = "Export the single trials; if these are, rename the column."
+        raise InvalidValueError(what, expected=expected, remedy=remedy)
+
+
+def _is_spread(name: str) -> bool:
+    words = [word for word in re.findall(r"\w+", _words(name)) if word not in WORDS["beside spreads"]]
+    return bool(words) and ({*words} <= WORDS["spreads"] or "".join(words) in WORDS["spreads"])
 
 
 def require_no_verdicts(beside: Iterable[Column]) -> None:
     """Raise if a column of which nothing is read says that a trial does not count."""
     for column in beside:
         texts = {cell for cell in column.cells if isinstance(cell, str)}
-        if odd := next((text for text in texts if text.strip(" !.").casefold() in LEFT_OUT), None):
+        if odd := next((text for text in texts if text.strip(" !.").casefold() in WORDS["left out"]), None):
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(odd), "says that the trial does not count", remedy)
 
@@ -136,13 +133,11 @@ def require_short(delivered: Delivered, layout: Layout) -> None:
     """Raise if most ISIs are longer than those after which the effect of a tap is sought."""
     usual_ms = statistics.median(trial.isi_ms for trial in delivered.trials if trial.isi_ms is not None)
     if usual_ms > layout.longest_isi_ms:
-        raise InvalidValueError(
-            f"the ISIs of {delivered.source} are longer than those of paired stimulation",
-            got=f"{usual_ms:g} ms in the median",
-            expected=f"at most {layout.longest_isi_ms:g} ms",
-            remedy="Are they in another unit (--unit), or numbers of samples, or times between trials? If they are "
-            "right, write longest_isi_ms = NUMBER into a layout.",
-        )
+        what, got = f"the ISIs of {delivered.source} are longer than those of paired stimulation", f"{usual_ms:g} ms"
+        remedy = "Are they in another unit (--unit), or numbers of samples, or times between trials? If they are "
+        remedy += "right, write longest_isi_ms = NUMBER into a layout."
+        expected = f"at most {layout.longest_isi_ms:g} ms"
+        raise InvalidValueError(what, got=f"{got} in the median", expected=expected, remedy=remedy)
 
 
 def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
@@ -186,9 +181,7 @@ def _require_ascending(columns: Columns) -> None:
     odd = [row for row, text in known.items() if not re.sub("[.,]", "", text).lstrip("-").isdigit()]
     if 0 < len(odd) < len(known):
         raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
-    places = (
-        times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]
-    )  # or of the day, perhaps
+    places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
     if places != sorted(places):
         what = f"the rows of {order.of} are not in the order of its column {order.name!r}"
         remedy = "Sort them as the trials were delivered, or name the column that says so: --column order=NAME."
@@ -196,12 +189,10 @@ def _require_ascending(columns: Columns) -> None:
     times = Counter(places)
     repeated = next((text for text, place in zip(known.values(), places, strict=False) if times[place] > 1), None)
     if not odd and repeated is not None:
-        raise InvalidValueError(
-            f"a trial has two rows and more in {order.of}, by its column {order.name!r}",
-            got=repeated,
-            remedy='Leave one row for each trial, such as that of one muscle: --where "muscle=FCR"; or name a column '
-            "of people or blocks: --column subject=NAME, --column block=NAME.",
-        )
+        what = f"a trial has two rows and more in {order.of}, by its column {order.name!r}"
+        remedy = 'Leave one row for each trial, such as that of one muscle: --where "muscle=FCR"; or name a column of '
+        remedy += "people or blocks: --column subject=NAME, --column block=NAME."
+        raise InvalidValueError(what, got=repeated, remedy=remedy)
 
 
 def require_said(columns: Columns) -> None:
@@ -209,23 +200,16 @@ def require_said(columns: Columns) -> None:
     isi, condition, paired = columns["isi"], columns["condition"], columns.paired
     both = [row for row in paired if columns.layout.alone is None and says_alone(condition.text(row), None)]
     if both and not all(says_alone(condition.text(row), None) for row in columns.rows):  # one word in all means nothing
-        raise condition.refused(
-            both[0],
-            f"says TMS alone, and the ISI there is {isi.text(both[0])}",
-            "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it is a "
-            "pair, rename the column.",
-        )
-    of_trials = [
-        row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None
-    ]
-    empty = [row for row in of_trials if "mep" not in columns.of or columns["mep"].number(row) is not None]
+        remedy = "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it is "
+        remedy += "a pair, rename the column."
+        raise condition.refused(both[0], f"says TMS alone, and the ISI there is {isi.text(both[0])}", remedy)
+    empty = [row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None]
+    empty = [row for row in empty if "mep" not in columns.of or columns["mep"].number(row) is not None]
     if empty and "asked" not in columns.of:
-        raise InvalidValueError(
-            f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}",
-            got=f"row {empty[0] + 1}",
-            remedy="If these are TMS alone, say --alone with what stands in their place, or --alone '' for an "
-            "empty cell; if not, mark them in a column called exclude.",
-        )
+        what = f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}"
+        remedy = "If these are TMS alone, say --alone with what stands in their place, or --alone '' for an empty "
+        remedy += "cell; if not, mark them in a column called exclude."
+        raise InvalidValueError(what, got=f"row {empty[0] + 1}", remedy=remedy)
 
 
 def _require_one_kind(columns: Columns) -> None:
@@ -246,12 +230,10 @@ def _require_one_kind(columns: Columns) -> None:
         shares = [len(kinds.keys() & {*each}) / len(kinds) for each in bins]
         if sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins):
             few = ", ".join(list(kinds)[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
-            raise InvalidValueError(
-                f"the column {name!r} of {isi.of} has several values at each ISI, and nothing is read of it",
-                got=few,
-                remedy=f'Say --where "{name}={next(iter(kinds))}" for one of them, --where "{name}={ALL}" if all are '
-                f'to be analysed together, or --column "subject={name}" if they are people.',
-            )
+            what = f"the column {name!r} of {isi.of} has several values at each ISI, and nothing is read of it"
+            remedy = f'Say --where "{name}={next(iter(kinds))}" for one of them, --where "{name}={ALL}" if all are to '
+            remedy += f'be analysed together, or --column "subject={name}" if they are people.'
+            raise InvalidValueError(what, got=few, remedy=remedy)
 
 
 def _require_isis(columns: Columns) -> None:
@@ -262,11 +244,10 @@ def _require_isis(columns: Columns) -> None:
     isis_ms = [isi.number(row) for row in paired]
     numbered = any(isis_ms == list(range(first, first + len(paired))) for first in (0, 1))
     if "order" not in columns.of and len(paired) >= _FEWEST and numbered:
-        raise InvalidValueError(
-            f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows",
-            remedy="Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called "
-            "trial.",
-        )
+        what = f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows"
+        remedy = "Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called "
+        remedy += "trial."
+        raise InvalidValueError(what, remedy=remedy)
     times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
     for odd in {min(times, default=0.0), max(times, default=0.0)}:
         others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}
@@ -299,23 +280,19 @@ def _require_one_unit(columns: Columns) -> None:
         if min(len(low), len(high)) < _FEW or not (low[-1] < least or high[0] > most) or high[0] < 8 * low[-1]:
             continue
         if 300 < np.median(high) / np.median(low) < 3000:
-            raise InvalidValueError(
-                f"the column {column.name!r} of {column.of} seems to be in two units",
-                got=f"{len(low)} up to {low[-1] / column.factor:g} and {len(high)} from {high[0] / column.factor:g} on",
-                remedy="Write all of them in one.",
-            )
+            what = f"the column {column.name!r} of {column.of} seems to be in two units"
+            got = f"{len(low)} up to {low[-1] / column.factor:g} and {len(high)} from {high[0] / column.factor:g} on"
+            raise InvalidValueError(what, got=got, remedy="Write all of them in one.")
 
 
 def _require_whole_blocks(columns: Columns) -> None:
     """Raise if a block comes back after another one, as muscles do."""
-    block, seen, last = columns["block"], set[str](), ""
-    for row in columns.rows if block.name not in columns.layout.where else ():
-        text = block.text(row)
-        if text and text != last and text in seen:
+    block, seen = columns["block"], set[str]()
+    for text, rows in groupby(columns.rows if block.name not in columns.layout.where else (), block.text):
+        if text and text in seen:
             remedy = f'If it tells muscles apart, say --where "{block.name}={text}", or --where "{block.name}={ALL}".'
-            raise block.refused(row, "comes back after another block", remedy)
+            raise block.refused(next(rows), "comes back after another block", remedy)
         seen.add(text)
-        last = text
 
 
 def _require_one_row_each(columns: Columns) -> None:
@@ -329,9 +306,8 @@ def _require_one_row_each(columns: Columns) -> None:
     are_whole = all(round(isi.number(row) or 0.0, 3).is_integer() for row in columns.paired)
     again = texts[:half] == texts[half:] and (meps[:half] == meps[half:] or not are_whole)  # as realised ISIs never do
     if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
-        raise InvalidValueError(
-            f"the ISIs of {isi.of} come {times if times > 1 else 2} times each, as if there was a row for "
-            "each of several muscles, or each row twice",
-            got=", ".join(texts[: 2 * max(times, 2)]),
-            remedy="Leave one row for each trial; if each row is one, number them in a column called trial.",
-        )
+        what = f"the ISIs of {isi.of} come {max(times, 2)} times each, as if there was a row for each of several "
+        what += "muscles, or each row twice"
+        remedy = "Leave one row for each trial; if each row is one, number them in a column called trial."
+        got = ", ".join(texts[: 2 * max(times, 2)])
+        raise InvalidValueError(what, got=got, remedy=remedy)

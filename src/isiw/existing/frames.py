@@ -16,9 +16,9 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
-from isiw.existing.doubts import LEFT_OUT
-from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
-from isiw.existing.quantities import require_one
+from isiw.existing.doubts import doubtful_words
+from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, WORDS, Layout, letters, unit_named
+from isiw.existing.quantities import require_one, unit_said
 from isiw.lazy import pd, scipy
 from isiw.opening import opened
 from isiw.text.named_code import library
@@ -26,6 +26,8 @@ from isiw.text.sanitize import counted
 
 TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
 WORKBOOKS: Final = (".xlsx", ".xlsm")
+STATISTICS: Final = {".sav": "read_sav", ".zsav": "read_sav", ".por": "read_por", ".dta": "read_dta"}
+"""Files of SPSS and Stata, and which function of pyreadstat reads them."""
 
 _LINES: Final = 100  # within so many lines the columns' names are sought
 _HEAD: Final = 40  # so many bytes show how a text is encoded
@@ -35,7 +37,7 @@ _SHOWN_OTHERWISE: Final = (
     (r'<row (?=[^>/]*hidden="(?:1|true)")[^>/]*?r="(\d+)"[^>/]*>', "hidden", _COUNT),
     (r'<c r="[A-Z]+(\d+)"[^>]*><f[^>]*(?:/>|>[^<]*</f>)(?:<v ?/>|<v></v>)?</c>', "without the result of a formula",
      "Open the workbook in Excel or LibreOffice, and save it."),
-    (rf'(?is)<comment ref="[A-Z]+(\d+)"(?:(?!</comment>).)*?<t[^>]*>\s*(?:{"|".join(LEFT_OUT)})[\s!.]*</t>',
+    (rf'(?is)<comment ref="[A-Z]+(\d+)"(?:(?!</comment>).)*?<t[^>]*>\s*(?:{"|".join(WORDS["left out"])})[\s!.]*</t>',
      "left out by a note", _COUNT),
 )  # fmt: skip
 """In a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do."""
@@ -46,6 +48,8 @@ def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
     suffix = path.suffix.lower()
     if suffix == ".mat":
         return of_vectors(read_arrays(path), layout)
+    if suffix in STATISTICS:
+        return _labelled(path, STATISTICS[suffix])
     if suffix == ".parquet":
         return named(pd.read_parquet(io.BytesIO(_content(path))))
     return (_workbook if suffix in WORKBOOKS else _texts)(_content(path), layout)
@@ -54,6 +58,17 @@ def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
 def _content(path: Path) -> bytes:
     with opened(path) as file:
         return file.read()
+
+
+def _labelled(path: Path, reader: str) -> pd.DataFrame:
+    """A table of SPSS or Stata: labels for values, and what labels of columns say behind their names."""
+    read = getattr(library("pyreadstat", "import"), reader)
+    frame, said = read(str(path), apply_value_formats=True, formats_as_category=False)
+    names = {}
+    for name, label in said.column_names_to_labels.items():
+        units = [unit_said(f"x {label or ''}", known) for known in (ISI_UNITS_MS, EMG_UNITS)]
+        names[name] = "".join([name, *(f" ({word})" for word in (*units, *doubtful_words(label or "")) if word)])
+    return cast("pd.DataFrame", frame.rename(columns=names))
 
 
 def named(frame: pd.DataFrame | None) -> pd.DataFrame:
@@ -112,7 +127,7 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     names = [*layout.names] or ["" if is_missing(cell) else str(cell).strip() for cell in rows[0]]
     body = rows if layout.names else rows[1:]
     below = body[0] if body and not layout.names else ()
-    units = [UNIT_WORDS.get(str(cell).strip().strip("[]()").casefold()) for cell in below]
+    units = [unit_named(str(cell).strip().strip("[]()")) for cell in below]
     if any(units) and all(unit or is_missing(cell) for unit, cell in zip(units, below, strict=True)):
         names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
         body = body[1:]
@@ -123,12 +138,9 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
         body = [row[1:] for row in body]  # R numbers its rows without naming the column of these numbers
     for number, row in enumerate(body, 1):
         if not all(is_missing(cell) for cell in row[len(names) :]):
-            raise InvalidValueError(
-                f"row {number} has {len(row)} cells, but there are {len(names)} names, so that this is no table that "
-                "can be read",
-                got=" | ".join(map(str, row[: len(names) + 2])),
-                remedy="Is a decimal comma also what separates the cells? Save the file with another separator.",
-            )
+            what = f"row {number} has {len(row)} cells, but there are {len(names)} names: no table that can be read"
+            remedy = "Is a decimal comma also what separates the cells? Save the file with another separator."
+            raise InvalidValueError(what, got=" | ".join(map(str, row[: len(names) + 2])), remedy=remedy)
     cells = [[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body]
     table = pd.DataFrame(cells, columns=names)
     table.attrs["title"] = title
@@ -177,9 +189,8 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         heads[name] = len(cells) - len(sheets[name]) + (0 if layout.names else 1)
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
     if len(with_trials) > 1:
-        raise InvalidValueError(
-            "several sheets of the workbook hold trials", got=", ".join(with_trials), remedy="Say --sheet NAME."
-        )
+        what = "several sheets of the workbook hold trials"
+        raise InvalidValueError(what, got=", ".join(with_trials), remedy="Say --sheet NAME.")
     filled = [name for name, rows in sheets.items() if len(rows) > 1]
     if not with_trials and len(filled) > 1:
         held = {name: ", ".join(str(cell) for cell in sheets[name][0] if not is_missing(cell)) for name in filled}
@@ -211,15 +222,14 @@ def _require_whole(book: Any, sheet: str, head: int) -> None:
         found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
         if rows := [str(row) for row in found if row > head]:
             what = f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}"
-            raise InvalidValueError(
-                what, got=f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}", remedy=remedy
-            )
+            got = f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}"
+            raise InvalidValueError(what, got=got, remedy=remedy)
 
 
 def _shown_in(number_format: str) -> str:
     """What Excel shows behind a number: the sign of per cent, or a unit."""
     words = [word.strip() for word in re.findall(r'"([^"]*)"', number_format)]
-    return "%" if "%" in number_format else next((word for word in words if word.casefold() in UNIT_WORDS), "")
+    return "%" if "%" in number_format else next((word for word in words if unit_named(word)), "")
 
 
 def read_arrays(path: Path) -> dict[str, Any]:

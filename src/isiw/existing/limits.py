@@ -92,13 +92,8 @@ def seconds_for(limits: ReadingLimits, path: Path, *, table: bool, rows: int = 0
 
 def passed(source: str, what: str, got: object, most: float, unit: str = "") -> InvalidValueError:
     """The error that a file has more than a limit allows."""
-    return InvalidValueError(
-        f"{source} {what}",
-        got=got,
-        expected=f"at most {most:g}{unit}",
-        remedy="Is it the right file? If it is, say --larger 2 (in Python limits=isiw.existing.ReadingLimits()"
-        ".larger(2)), or more.",
-    )
+    remedy = "Is it the right file? If it is, say --larger 2, or more (limits=isiw.existing.ReadingLimits().larger(2))."
+    return InvalidValueError(f"{source} {what}", got=got, expected=f"at most {most:g}{unit}", remedy=remedy)
 
 
 def require_file(limits: ReadingLimits, path: Path, *, text: bool) -> None:
@@ -106,16 +101,13 @@ def require_file(limits: ReadingLimits, path: Path, *, text: bool) -> None:
     if not path.is_file():
         return
     with opened(path) as file:
-        size = os.fstat(file.fileno()).st_size
-        if size > 1e6 * limits.file_mb:
-            raise passed(path.name, "is too large", f"{size / 1e6:.0f} MB", limits.file_mb, " MB")
+        require_most(path.name, ("is too large", os.fstat(file.fileno()).st_size / 1e6, limits.file_mb, " MB"))
         if file.read(2) == b"PK":
             try:
                 unpacked_mb = sum(part.file_size for part in zipfile.ZipFile(file).infolist()) / 1e6
             except (zipfile.BadZipFile, ValueError, NotImplementedError):  # its reader says what is wrong
                 return
-            if unpacked_mb > limits.unpacked_mb:
-                raise passed(path.name, "unpacks to too much", f"{unpacked_mb:.0f} MB", limits.unpacked_mb, " MB")
+            require_most(path.name, ("unpacks to too much", unpacked_mb, limits.unpacked_mb, " MB"))
         elif text:
             _require_lines(limits, path.name, file)
 
@@ -126,39 +118,35 @@ def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
     while chunk := file.read(_CHUNK):
         for end in lines:
             lines[end] += chunk.count(end)
-    require_most(source, ("has too many lines", max(lines.values()), limits.lines))
+    require_most(source, ("has too many lines", max(lines.values()), limits.lines, ""))
     file.seek(0)
     for line in islice(file, _FIRST_LINES):
         cells = 1 + (max(map(line.count, _SIGNS)) or sum(1 for _ in islice(_BLANKS.finditer(line), limits.columns)))
-        require_most(source, ("has too many columns", cells, limits.columns))
         most = _BYTES_PER_SIGN * limits.cell_length * cells
-        if len(line) > most:
-            raise passed(source, "has too long a line for its cells", f"{len(line)} bytes", most, " bytes")
+        require_most(source, ("has too many columns", cells, limits.columns, ""),
+                     ("has too long a line for its cells", len(line), most, " bytes"))  # fmt: skip
 
 
 def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> None:
     """Raise if a table has too many rows, columns or cells, or too long a name or text."""
-    require_most(
-        source,
-        ("has too many columns", frame.shape[1], limits.columns),
-        ("has too many rows", frame.shape[0], limits.rows),
-        ("has too many cells", frame.size, limits.cells),
-    )
+    rows, columns = frame.shape
+    require_most(source, ("has too many columns", columns, limits.columns, ""),
+                 ("has too many rows", rows, limits.rows, ""),
+                 ("has too many cells", frame.size, limits.cells, ""))  # fmt: skip
     texts = [("has too long a name of a column", [*map(str, frame.columns)], limits.name_length)]
     for name, cells in frame.items():
         if not pd.api.types.is_numeric_dtype(cells):
             texts.append((f"has too long a text in the column {name!r}", cells.tolist(), limits.cell_length))
     for what, each, most in texts:
         longest = max((len(cell) for cell in each if isinstance(cell, str | bytes)), default=0)
-        if longest > most:
-            raise passed(source, what, f"{longest} characters", most, " characters")
+        require_most(source, (what, longest, most, " characters"))
 
 
-def require_most(source: str, *counts: tuple[str, int, int]) -> None:
-    """Raise if there is more of something than a limit allows: what it has, how much, and at most."""
-    for what, got, most in counts:
+def require_most(source: str, *counts: tuple[str, float, float, str]) -> None:
+    """Raise if there is more of something than a limit allows: what it has, how much, at most, and in which unit."""
+    for what, got, most, unit in counts:
         if got > most:
-            raise passed(source, what, got, most)
+            raise passed(source, what, f"{got:.0f}{unit}" if unit else got, most, unit)
 
 
 def limit_memory(memory_mb: float) -> None:

@@ -15,8 +15,7 @@ import numpy as np
 import isiw
 from isiw.errors import IsiwError
 from isiw.existing import formats
-from isiw.existing.answer import Answer
-from isiw.existing.apart import read_apart
+from isiw.existing.apart import Answer, read_apart
 from isiw.existing.delivered import Delivered
 from isiw.existing.formats.contents import Contents, Track
 from isiw.existing.frames import named

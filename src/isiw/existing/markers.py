@@ -10,19 +10,12 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import plain, says_alone
-from isiw.existing.layout import Layout
+from isiw.existing.cells import says_alone
+from isiw.existing.layout import MARKS, Layout, plain
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import FloatArray
 
-_MARKS: Final[Mapping[str, tuple[str, str]]] = {
-    "pulse": ("the pulse of TMS", "tms pulse tmspulse magneticpulse"),
-    "tap": ("the tap (its impact) or the electrical pulse", "tap impact hit electricalpulse conditioning pns"),
-    "valve": ("the valve command", "valve valvecommand"),
-    "alone": ("TMS alone", "tmsalone tmsonly singlepulse pulsealone unconditioned"),
-}
-"""What is marked, in words, and what events of it are called that need not be named, without blanks."""
 _TWICE_S: Final = 3e-3  # a trigger that is found twice within so short a time is one, which came at the first edge
 _SAME_PULSE_S: Final = 20e-3  # an event of a pulse alone marks the pulse that is marked within so short a time
 _EARLY_S: Final = 20e-3  # a pulse at most so long before a tap was meant to follow it, and is TMS before the impact
@@ -66,7 +59,7 @@ def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
         return [key]
     names = names_of(events)
     if (stated := layout.markers.get(key)) is None:
-        return [name for name in names if _plain(name) in _MARKS[key][1].split()]
+        return [name for name in names if _plain(name) in MARKS[key][1].split()]
     number = re.sub(r"\D", "", stated)  # of which MNE may keep no more
     fits = ([stated], [name for name in names if _plain(name) == _plain(stated)], [number])
     return next((each for each in fits if each and {*each} <= {*names}), [])
@@ -80,7 +73,7 @@ def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str 
         expected = f"one of {', '.join(map(repr, names_of(events)))}"
         raise InvalidValueError(f"{source} has {what} of this name", got=layout.markers[key], expected=expected)
     if len(fitting) > 1:
-        what = f"events of {len(fitting)} names in {source} may mark {_MARKS[key][0]}"
+        what = f"events of {len(fitting)} names in {source} may mark {MARKS[key][0]}"
         remedy = f'Say --marker "{key}={fitting[0]}", or give all that mark it one name.'
         raise InvalidValueError(what, got=", ".join(fitting), remedy=remedy)
     return fitting[0] if fitting else None
@@ -98,13 +91,12 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
     if missing := [one for one in ("pulse", key) if found[one] is None]:
         names = ", ".join(map(repr, names_of(events)))
         said = " ".join(f"--{'marker' if names else 'channel'} {one}=NAME" for one in missing)
-        what = f"no event of {source} is known to mark {', nor '.join(_MARKS[one][0] for one in missing)}"
+        what = f"no event of {source} is known to mark {', nor '.join(MARKS[one][0] for one in missing)}"
         remedy = f"Say {said}. isiw analyse FILE --look says what is in the file."
         raise InvalidValueError(what, got=names or "no events, so that no event was found", remedy=remedy)
     if origin_name == pulse_name:
-        raise InvalidValueError(
-            f"one event of {source} cannot mark both stimuli", got=pulse_name, remedy=f"Say --marker {key}=NAME."
-        )
+        what = f"one event of {source} cannot mark both stimuli"
+        raise InvalidValueError(what, got=pulse_name, remedy=f"Say --marker {key}=NAME.")
     at_s, origins_s = times_of(events, pulse_name), times_of(events, origin_name)
     origins_s = origins_s[np.diff(origins_s, prepend=-np.inf) > _TWICE_S]
     alone_s = times_of(events, None if alone_name in {pulse_name, origin_name} else alone_name)
@@ -127,12 +119,12 @@ def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout
         came_s = None if pulse.origin_s is None else round(pulse.origin_s, 9)
         shared = came_s is not None and came_s == last_came_s
         if taps > 1 or shared:
-            raise InvalidValueError(
-                f"two pulses of {source} have one tap" if shared else f"{taps} taps of {source} come before one pulse",
-                got=f"at {pulse.at_s:.3f} s",
-                expected=f"one of each within {layout.longest_isi_ms:g} ms",
-                remedy="Leave out the events that mark no stimulus, such as a second edge, or give them another name.",
-            )
+            what = f"two pulses of {source} have one tap"
+            if not shared:
+                what = f"{taps} taps of {source} come before one pulse"
+            expected = f"one of each within {layout.longest_isi_ms:g} ms"
+            remedy = "Leave out the events that mark no stimulus, such as a second edge, or give them another name."
+            raise InvalidValueError(what, got=f"at {pulse.at_s:.3f} s", expected=expected, remedy=remedy)
         last_s, last_came_s = pulse.at_s + _EARLY_S, came_s
 
 
@@ -167,11 +159,9 @@ def _with_the_unmarked(pulses: list[Pulse], layout: Layout, source: str) -> list
     if not unmarked or not paired:
         return pulses
     if layout.unmarked is None:
-        raise InvalidValueError(
-            f"{counted(len(unmarked), 'pulse')} of {len(pulses)} in {source} have no tap within "
-            f"{layout.longest_isi_ms:g} ms before them, and nothing says whether none came or its marker is missing",
-            got=f"the first at {unmarked[0].at_s:.3f} s",
-            remedy="Say --unmarked alone if they are TMS alone, or --unmarked lost to leave them out; or name the "
-            "events that mark TMS alone: --marker alone=NAME.",
-        )
+        what = f"{counted(len(unmarked), 'pulse')} of {len(pulses)} in {source} have no tap within "
+        what += f"{layout.longest_isi_ms:g} ms before them, and nothing says whether none came or its marker is missing"
+        remedy = "Say --unmarked alone if they are TMS alone, or --unmarked lost to leave them out; or name the events "
+        remedy += "that mark TMS alone: --marker alone=NAME."
+        raise InvalidValueError(what, got=f"the first at {unmarked[0].at_s:.3f} s", remedy=remedy)
     return [replace(one, lost=layout.unmarked == "lost") if one in unmarked else one for one in pulses]

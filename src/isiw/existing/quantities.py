@@ -10,14 +10,22 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing import doubts
-from isiw.existing.cells import ALONE, TAP_ALONE, Column, plain, says_alone, with_decimals, without_unit_in_cells
-from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters, required_unit
+from isiw.existing.cells import Column, says_alone, with_decimals, without_unit_in_cells
+from isiw.existing.layout import (
+    COLUMNS,
+    EMG_UNITS,
+    ISI_UNITS_MS,
+    UNIT_WORDS,
+    WORDS,
+    Layout,
+    letters,
+    plain,
+    required_unit,
+    unit_named,
+)
 from isiw.findings import Kind
 from isiw.lazy import pd
 
-_VAGUE: Final = frozenset({"interval", "delay", "soa", "amplitude", "amp", "peaktopeak", "peaktopeakamplitude",
-                           "emgpeaktopeak", "p2pamplitude", "ptpamplitude", "p2p", "ptp"})  # fmt: skip
-"""Names of columns that may also be of the interval between trials, or of the stimulus, and give way to others."""
 _ASKED: Final = frozenset({"isi", "mep", "status", "exclude"})  # of which there may be two, that say different things
 
 
@@ -44,7 +52,7 @@ class Columns:
 
     def tap_alone(self, row: int) -> bool:
         """True if a row is a tap alone, by a column for it or by its condition."""
-        return bool(self["tap_alone"].flag(row)) or plain(self["condition"].text(row)) in TAP_ALONE
+        return bool(self["tap_alone"].flag(row)) or plain(self["condition"].text(row)) in WORDS["tap alone"]
 
     @cached_property
     def paired(self) -> list[int]:
@@ -61,14 +69,13 @@ class Columns:
         """The columns of a table, as they are named or else as they are called."""
         names = [str(name) for name in frame.columns]
         held = {key: _named(key, names, layout, source) for key in COLUMNS if key != "mep" or key in needed}
-        for key, what in (("isi", "ISIs"), ("mep", "amplitudes of the MEPs")):
+        for key, held_ones in (("isi", "ISIs"), ("mep", "amplitudes of the MEPs")):
             if key in needed and held[key] is None:
-                raise InvalidValueError(
-                    f"no column of {source} is known to hold the {what}",
-                    got=", ".join(name for name in names if name.strip()) or "no names",
-                    remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: '
-                    "--layout FILE.",
-                )
+                what = f"no column of {source} is known to hold the {held_ones}"
+                got = ", ".join(name for name in names if name.strip()) or "no names"
+                remedy = f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file '
+                remedy += "(--layout)."
+                raise InvalidValueError(what, got=got, remedy=remedy)
         columns, of_units = dict[str, Column](), set[str]()
         for key, name in held.items():
             if name is not None:
@@ -93,7 +100,7 @@ class Columns:
         doubts.require_no_verdicts(beside.values())
         doubts.require_reference(columns["isi"], layout.reference)
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
-            alone = ALONE | TAP_ALONE
+            alone = WORDS["alone"] | WORDS["tap alone"]
             of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
             if len({*map(plain, of_pairs.texts)} - {""}) > 1:
                 beside[condition.name] = of_pairs
@@ -150,7 +157,7 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     found = [(known, name) for known in COLUMNS[key] for name, plain_name in free if plain_name == known]
     first = found[0][0] if found else ""
     several = [name for known, name in found
-               if known == first or (key in _ASKED and (known in _VAGUE) == (first in _VAGUE))]  # fmt: skip
+               if known == first or (key in _ASKED and len({known, first} & WORDS["vague"]) != 1)]  # fmt: skip
     if len(several) > 1:
         what = f"several columns of {source} may hold the {key}"
         remedy = f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them."
@@ -174,8 +181,9 @@ def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
         if of is None or not (letters(name).startswith(of[1]) or of[1] in COLUMNS.get(key, ())):
             continue
         for text in dict.fromkeys(frame.iloc[:, place].dropna().astype(str)):
-            unit = UNIT_WORDS.get(text.strip().casefold())
-            if unit is not None and (of[1] or unit in known):  # a unit of no column is of those that may have it
+            unit = unit_named(text)
+            fits = unit in known or (known is EMG_UNITS and unit not in ISI_UNITS_MS)  # or per cent, of amplitudes
+            if unit is not None and (of[1] or fits):  # a unit of no column is of those that may have it
                 found[other] = unit if found.get(other) in {None, unit} else f"{found[other]}) ({unit}"
     return found
 
@@ -183,7 +191,7 @@ def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
     """The unit that a column's name says, of those of one quantity; raise if it says two, such as one in its cells."""
     inside, bare = re.findall(r"[\[(]([^][()]*)[\])]", name), re.findall(r"[^\W_]+", re.sub(r"[\[(].*", "", name))[1:]
-    found, usual = ([unit for word in words if (unit := UNIT_WORDS.get(word.strip().casefold(), "")) in known]
+    found, usual = ([unit for word in words if (unit := unit_named(word) or "") in known]
                     for words in ([*inside, *bare[-1:]], bare))  # fmt: skip
     if len({*found}) > 1:
         remedy = "Leave the right one in its name."

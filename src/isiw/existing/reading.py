@@ -163,8 +163,8 @@ def _people_of(
     visits = [(own, subject, day) for subject in people for day, own in _days(columns, people[subject], dates).items()]
     if limits is not None:
         most = max(len(own) for own, _, _ in visits)
-        require_most(source, ("has too many people and days", len(visits), limits.visits),
-                     ("has too many trials of one person and day", most, limits.trials))  # fmt: skip
+        require_most(source, ("has too many people and days", len(visits), limits.visits, ""),
+                     ("has too many trials of one person and day", most, limits.trials, ""))  # fmt: skip
     found = []
     for own, subject, day in sorted(visits, key=lambda visit: visit[0][0]):
         person = _person(replace(columns, rows=own), reference, subject or name)

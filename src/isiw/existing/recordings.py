@@ -17,7 +17,7 @@ from isiw.existing.doubts import is_rectified, require_said
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
-from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
+from isiw.existing.layout import EMG_UNITS, MARKERS, Layout, required_unit, unit_named
 from isiw.existing.markers import Pulse, marked, names_of, pulses_of
 from isiw.existing.quantities import Columns, isis_of, require_one, unit_said
 from isiw.findings import Kind
@@ -101,7 +101,7 @@ def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[st
     triggers = events_of((key, at_s, 0.0) for key in MARKERS if key in tracks for at_s in tracks[key].onsets_s())
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
     emg = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
-    known, notes = UNIT_WORDS.get(emg.unit.strip().casefold()), contents.notes
+    known, notes = unit_named(emg.unit), contents.notes
     what = f"the channel {emg.name!r} of {contents.source}"
     unit = required_unit(layout, EMG_UNITS, known, what, emg.unit or None)
     if known not in {None, unit}:
@@ -173,12 +173,11 @@ def _is_tap(
 def _require_same(what: str, isi_ms: float | None, seen_s: float | None) -> None:
     """Raise if the ISI in a table is not that of the events; None is TMS alone, or a pulse without a tap."""
     if isi_ms is None or seen_s is None or abs(1e3 * seen_s - isi_ms) > _APART_MS:
-        raise InvalidValueError(
-            f"the ISI of {what} is not that of the events in its sweep",
-            got="TMS alone" if isi_ms is None else f"{isi_ms:g} ms",
-            expected="no tap, by the events" if seen_s is None else f"{1e3 * seen_s:.1f} ms, by the events",
-            remedy="Correct one of them, or leave one out of the file.",
-        )
+        got = "TMS alone" if isi_ms is None else f"{isi_ms:g} ms"
+        expected = "no tap, by the events" if seen_s is None else f"{1e3 * seen_s:.1f} ms, by the events"
+        what = f"the ISI of {what} is not that of the events in its sweep"
+        remedy = "Correct one of them, or leave one out of the file."
+        raise InvalidValueError(what, got=got, expected=expected, remedy=remedy)
 
 
 def _only_one(columns: Columns) -> str:

@@ -98,9 +98,8 @@ class Replay:
         share = float((far_ms > NEAR_MS).mean())
         said = (
             f"{name}: {100 * share:.0f} % of its ISIs could not be answered: no trial was left within {NEAR_MS:g} ms, "
-            f"and the nearest one answered, at most {far_ms.max():.0f} ms away."
         )
-        return said if share else ""
+        return f"{said}and the nearest one answered, at most {far_ms.max():.0f} ms away." if share else ""
 
     def _lines(self, name: str) -> Iterator[str]:
         scores = self.f1_by_trial(name)

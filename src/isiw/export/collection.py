@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import hashlib
 import itertools
 import random
 import secrets
@@ -24,6 +23,7 @@ from isiw.log.records import Onset
 from isiw.log.salvage import only_in, salvage_file
 from isiw.log.schema import Event
 from isiw.log.verdicts import VERDICTS
+from isiw.opening import hash_of
 from isiw.summary import words_of
 from isiw.text.sanitize import counted
 from isiw.text.stimuli import StimulusWords
@@ -223,7 +223,7 @@ def read_logs(source: str | Path, channels: Iterable[str] | None = None) -> tupl
         except LogError as error:
             left_out.append(f"{file.name} is left out: {error.what}.")
             continue
-        first = records.setdefault(hashlib.sha256(file.read_bytes()).hexdigest(), record)
+        first = records.setdefault(hash_of(file), record)
         if first is not record:
             left_out.append(f"{file.name} is left out: it is a copy of {first.path.name}.")
     if not records:

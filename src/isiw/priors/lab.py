@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,6 +23,7 @@ from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import MOST_APART_MS, Place
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior, ShapeShares
+from isiw.opening import hash_of
 from isiw.priors.covariates import Slope, expected, slopes_of
 from isiw.priors.days import (
     after_pulses,
@@ -243,7 +243,7 @@ def _pulses_of_people(searches: Sequence[ThresholdRecord]) -> dict[str, tuple[Tr
 
 
 def _learnt_session(record: SessionRecord | ThresholdRecord) -> LearntSession:
-    header, digest = record.header, hashlib.sha256(record.path.read_bytes()).hexdigest()
+    header, digest = record.header, hash_of(record.path)
     if isinstance(record, SessionRecord):
         trials, muscle = len(record.table.told), record.header.visit.muscle
     else:

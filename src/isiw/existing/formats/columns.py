@@ -14,14 +14,12 @@ from isiw.errors import InvalidValueError
 from isiw.existing import frames
 from isiw.existing.cells import Column, is_missing, with_decimals
 from isiw.existing.formats.contents import Contents, Track, events_of, parted, timed
-from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, UNIT_WORDS, Layout
+from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, Layout, unit_named
 from isiw.existing.quantities import require_one, unit_said
 from isiw.lazy import pd
 from isiw.types import FloatArray
 
-_PERIOD: Final = re.compile(
-    r"(?=interval\W|[\d.]+\s*\w+/sample)(?:interval\W+)?(\d[\d.e-]*)\s*([a-zµ]+)", re.IGNORECASE
-)
+_PERIOD: Final = re.compile(r"(?i)(?=interval\W|[\d.]+\s*\w+/sample)(?:interval\W+)?(\d[\d.e-]*)\s*([a-zµ]+)")
 _RATE: Final = re.compile(r"(?:rate|sampl|frequency)[^\n\d]*(\d[\d.]*)\s*(k?)Hz", re.IGNORECASE)
 """What the lines above samples say of the time between them, or of their rate."""
 _FEW: Final = 0.01  # with a larger share of steps that are longer than usual, times have no pauses but are rounded
@@ -35,13 +33,12 @@ def read(path: Path, layout: Layout) -> Contents:
         return Contents(source, trials=frame)
     rate_hz, head = required(layout, "rate_hz", f"the sampling rate of {source}"), frame.attrs.get("head", "")
     for number, word in _PERIOD.findall(head):
-        if (unit := UNIT_WORDS.get(word.casefold())) in ISI_UNITS_MS and float(number):
+        if (unit := unit_named(word)) in ISI_UNITS_MS and float(number):
             require_period(rate_hz, float(number), unit, f"the head of {source}")
     for number, kilo in _RATE.findall(head):
         require_rate(rate_hz, float(number) * (1e3 if kilo else 1.0), f"the head of {source}")
-    remedy = "If no line holds their names, write names = [...] into the layout."
     for name in layout.channels.values():
-        require_one("column", source, name, frame, remedy)
+        require_one("column", source, name, frame, "If no line holds their names, write names = [...] into the layout.")
     breaks = frame.iloc[:, 0].astype(str).str.endswith("=").to_numpy()
     frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
     pauses_s, blocks = dict[int, float](), np.flatnonzero(np.diff(block, prepend=-1)).tolist()
@@ -53,8 +50,7 @@ def read(path: Path, layout: Layout) -> Contents:
     tracks, texts = list[Track](), list[tuple[str, float, float]]()
     for key, name in layout.channels.items():
         if key == "events":
-            each = enumerate(frame[name].tolist())
-            texts = [(str(text).lstrip("#* "), at, 0.0) for at, text in each if not is_missing(text)]
+            texts = [(str(text).lstrip("#* "), at, 0.0) for at, text in enumerate(frame[name]) if not is_missing(text)]
         else:
             values, kind = _numbers(frame, name, layout, source), "stim" if key in MARKERS else ""
             tracks.append(Track.of_values(name, rate_hz, stretches, values, unit_said(name, EMG_UNITS) or "", kind))
@@ -91,8 +87,7 @@ def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[i
     step = float(steps.mean()) if len(steps) > 1 else 0.0
     if not step > 0 or not np.all(np.abs(np.cumsum(steps - step)) <= 1.01 * step):  # they may be rounded
         return None
-    unit = unit_said(name, ISI_UNITS_MS)
-    if unit is None and math.isclose(step, 1.0, rel_tol=1e-6):
+    if (unit := unit_said(name, ISI_UNITS_MS)) is None and math.isclose(step, 1.0, rel_tol=1e-6):
         return None
     found_hz = _rate_of(step, unit, rate_hz)
     return found_hz, dict(zip((late + 1).tolist(), (over / step / found_hz).tolist(), strict=True))
@@ -119,7 +114,6 @@ def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> Flo
         cells = cells.str.replace(",", ".")
     numbers = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64)
     if (bad := np.flatnonzero(~np.isfinite(numbers))).size:
-        raise Column(name, frame[name].tolist(), of=source).refused(
-            int(bad[0]), "is no number", "Do the names stand for the right columns, and are the lines before skipped?"
-        )
+        remedy = "Do the names stand for the right columns, and are the lines before skipped?"
+        raise Column(name, frame[name].tolist(), of=source).refused(int(bad[0]), "is no number", remedy)
     return numbers

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import pairwise
 from operator import itemgetter
 from pathlib import Path
 from types import MappingProxyType
@@ -13,15 +14,18 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.layout import UNIT_WORDS
+from isiw.existing.layout import unit_named
 from isiw.lazy import pd
-from isiw.types import FloatArray
+from isiw.types import FloatArray, IntArray
 
 PIECE: Final = 2**20  # so many samples are in memory at once if a whole channel is looked through
 APART_S: Final = 100.0  # between sweeps without a time of their own, and for a pause of unknown length
 _ROWS: Final = 2**20  # of a file beside a recording; without a number pandas opens files of the system
 _SAME: Final = 1.5  # so many samples apart a code and an event of one name are one event
-
+_GAP_S: Final = 2.5e-3  # samples that are later than expected by so much, for good, come after a gap; others jitter
+_AROUND_S: Final = 1.0
+_ENOUGH_S: Final = 10.0  # a stretch that is longer says at which rate its samples were really taken
+_SCATTER_S: Final = 2e-3  # times that scatter more are said
 
 Event = tuple[str, float, float]  # what it is called, when it was, and how long it lasted [s]
 
@@ -55,6 +59,54 @@ def timed(noted: Iterable[Event], stretches: Sequence[Stretch], rate_hz: float) 
     return found
 
 
+def clocked(
+    times_s: FloatArray, nominal_hz: float | None, what: str, index: IntArray | None = None, samples: int = 0
+) -> tuple[float, tuple[Stretch, ...], tuple[str, ...]]:
+    """By times of samples [s], of those at `index` if not of all: their rate [Hz], stretches, and a note of scatter."""
+    index = np.arange(len(times_s)) if index is None else index
+    ahead = np.diff(index)
+    steps_s = np.diff(times_s) / ahead
+    if len(times_s) < 3 or not np.isfinite(times_s).all() or not np.median(steps_s) > 0:
+        raise InvalidValueError(f"the times of the samples of {what} do not ascend", got=f"{len(times_s)} samples")
+    nominal_s = 1.0 / nominal_hz if nominal_hz else float(np.median(steps_s))
+    late_s = times_s - index * nominal_s
+    around = max(3, round(_AROUND_S / (nominal_s * float(ahead.mean()))))
+    near_s = late_s[: len(late_s) // around * around].reshape(-1, around)  # about which times scatter, whatever gaps
+    jitter_s = 1.48 * np.median(np.abs(near_s - np.median(near_s, axis=1, keepdims=True))) if len(near_s) else 0.0
+    least_s = max(_GAP_S, 1.5 * nominal_s, 2.0 * float(jitter_s))
+    late = (np.flatnonzero(np.diff(late_s) > 0.8 * least_s) + 1).tolist()
+    begins = [0, *_gaps(late_s, late, (0, len(times_s)), around, least_s)]
+    spans = [slice(*span) for span in pairwise([*begins, len(times_s)])]
+    longest = max(spans, key=lambda span: index[span.stop - 1] - index[span.start])
+    period_s = nominal_s
+    if times_s[longest][-1] - times_s[longest][0] >= _ENOUGH_S:  # by a line through all of them
+        centred = index[longest] - index[longest].mean()
+        period_s = float(centred @ (times_s[longest] - times_s[longest].mean()) / (centred @ centred))
+    stretches, scatter = [], list[FloatArray]()
+    for span, last in zip(spans, [*index[begins[1:]].tolist(), samples or len(times_s)], strict=True):
+        first = int(index[span.start])
+        late_s = times_s[span] - period_s * (index[span] - first)
+        stretches.append(Stretch(first, last - first, float(np.median(late_s))))
+        scatter.append(np.abs(late_s - stretches[-1].start_s))
+    scatter_s = float(np.quantile(np.concatenate(scatter), 0.95))
+    note = f"The times of {what} scatter by {1e3 * scatter_s:.1f} ms: MEPs may lie elsewhere."
+    return 1.0 / period_s, tuple(stretches), (note,) if scatter_s > _SCATTER_S else ()
+
+
+def _gaps(late_s: FloatArray, places: list[int], span: tuple[int, int], around: int, least_s: float) -> list[int]:
+    """Where samples are later than those before, for good: the surest place, and those on both sides of it."""
+    sure = dict[int, float]()
+    for at in (place for place in places if span[0] < place < span[1]):
+        before, after = late_s[max(span[0], at - around) : at], late_s[at : min(span[1], at + around)]
+        if np.median(after) - np.median(before) > least_s:
+            sure[at] = float(after.mean() - before.mean())
+    if not sure:
+        return []
+    surest = max(sure, key=lambda place: sure[place])
+    sides = [_gaps(late_s, places, side, around, least_s) for side in ((span[0], surest), (surest, span[1]))]
+    return [*sides[0], surest, *sides[1]]
+
+
 def part_of(values: Any, first: int, last: int) -> FloatArray:
     """Numbers that are in memory, or are read when they are chosen, from one sample to before another."""
     return np.asarray(values[first:last], dtype=np.float64)
@@ -84,8 +136,8 @@ class Track:
 
     def with_unit(self, said: Any) -> Track:
         """The same, whose unit is also said elsewhere; two that differ are no unit that is known."""
-        known = UNIT_WORDS.get(str(said).strip().casefold())
-        if known is None or known == UNIT_WORDS.get(self.unit.strip().casefold(), known):
+        known = unit_named(said)
+        if known is None or (unit_named(self.unit) or known) == known:
             return replace(self, unit=self.unit or known or "")
         return replace(self, unit=f"{self.unit} in one place, and {said} in another")
 
@@ -122,12 +174,11 @@ class Track:
             falls += (at_s + np.flatnonzero(turns < 0) / self.rate_hz).tolist()
         spans_s = np.diff(sorted([*rises, *falls]))
         if len(spans_s) > 2 and 0.5 < np.median(spans_s[0::2]) / np.median(spans_s[1::2]) < 2:
-            raise InvalidValueError(
-                f"the trigger {self.name!r} is about as long at one level as at the other, so that it cannot be known "
-                "which of its edges are stimuli",
-                got=f"{len(rises)} edges up and {len(falls)} down",
-                remedy="Export events in its place, or a trigger that is short for each stimulus.",
-            )
+            what = f"the trigger {self.name!r} is about as long at one level as at the other, so that it cannot be "
+            what += "known which of its edges are stimuli"
+            got = f"{len(rises)} edges up and {len(falls)} down"
+            remedy = "Export events in its place, or a trigger that is short for each stimulus."
+            raise InvalidValueError(what, got=got, remedy=remedy)
         return falls if 2 * high > sum(stretch.samples for stretch in self.stretches) else rises
 
     def codes(self) -> list[tuple[float, int]]:
@@ -143,19 +194,16 @@ class Track:
             times_s = (at_s + up / self.rate_hz).tolist()
             found += zip(times_s, codes[up].tolist(), old[up].tolist(), strict=True)
         alone = {code for _, code, before in found if before == 0}
-        return [
-            (at, code ^ before if before & code == before and code not in alone and code ^ before in alone else code)
-            for at, code, before in found
-            if code > 0
-        ]
+        added = {(code, before) for _, code, before in found if before & code == before and code ^ before in alone}
+        added = {both for both in added if both[0] not in alone}
+        return [(at, code ^ was if (code, was) in added else code) for at, code, was in found if code > 0]
 
 
 def text_of(*values: Any) -> str:
     """What an event is called, by its texts and codes; a whole number has no decimal sign."""
-    each = (value.decode("utf-8", "replace") if isinstance(value, bytes) else value for value in values)
-    return " ".join(
-        f"{value:.15g}" if isinstance(value, int | float | np.number) else f"{value}" for value in each
-    ).strip()
+    texts = (value.decode("utf-8", "replace") if isinstance(value, bytes) else value for value in values)
+    numbers = (int, float, np.number)
+    return " ".join(f"{one:.15g}" if isinstance(one, numbers) else f"{one}" for one in texts).strip()
 
 
 def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
@@ -198,12 +246,10 @@ class Contents:
             return replace(self, tracks=tracks)
         off = (events["onset"] * tracks[0].rate_hz - events.get("sample", np.nan)).abs().median() if tracks else 0.0
         if tracks and off > 0.1 * tracks[0].rate_hz:
-            raise InvalidValueError(
-                f"the onsets of events beside {self.source} are not those of their samples",
-                got=f"a difference of {off:.0f} samples",
-                expected=f"seconds, at {tracks[0].rate_hz:g} Hz",
-                remedy="Correct the onsets, or the samples, in the file of events.",
-            )
+            what = f"the onsets of events beside {self.source} are not those of their samples"
+            got, expected = f"a difference of {off:.0f} samples", f"seconds, at {tracks[0].rate_hz:g} Hz"
+            remedy = "Correct the onsets, or the samples, in the file of events."
+            raise InvalidValueError(what, got=got, expected=expected, remedy=remedy)
         named = [events[one] for one in ("trial_type", "value") if one in events and events[one].notna().any()]
         names = [text_of(each) for each in named[0]] if named else ""
         return replace(self, tracks=tracks, events=events.assign(name=names))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -17,8 +18,7 @@ from isiw.opening import opened
 from isiw.types import FloatArray
 
 _FIELDS: Final = {"label": 16, "transducer": 80, "unit": 8, "least": 8, "most": 8, "lowest": 8, "highest": 8,
-                  "filter": 80, "count": 8, "reserved": 32}  # fmt: skip
-"""The fields of each signal in a header, and their bytes."""
+                  "filter": 80, "count": 8, "reserved": 32}  # fmt: skip # of each signal in a header, in bytes
 _ROUNDED_S: Final = 1e-3  # times of records are rounded by so much; what is farther from the record before is a gap
 _AT_ONCE: Final = 100  # so many records are read at once for their annotations
 
@@ -36,13 +36,12 @@ class _Header(NamedTuple):
 
     def raw(self, signal: int, first: int, last: int) -> np.ndarray[Any, np.dtype[Any]]:
         """One signal in some records, a row each."""
-        begin = self.begins + first * self.record.itemsize
-        return np.fromfile(self.path, self.record, last - first, offset=begin)[f"{signal}"]
+        offset = self.begins + first * self.record.itemsize
+        return np.fromfile(self.path, self.record, last - first, offset=offset)[f"{signal}"]
 
     def samples(self, signal: int, first: int, last: int) -> FloatArray:
         """The numbers of one signal from one sample to before another, in its unit."""
-        count = self.counts[signal]
-        begin = first // count
+        begin = first // (count := self.counts[signal])
         digital = self.raw(signal, begin, -(-last // count))
         if digital.ndim > 2:  # of three bytes
             digital = np.pad(digital.reshape(-1, 3), ((0, 0), (1, 0))).view("<i4") >> 8
@@ -103,10 +102,9 @@ def _header(path: Path) -> _Header:
         signals = int(head[252:256])
         texts = file.read(256 * signals)
         size = file.seek(0, 2)
-    fields, begin = dict[str, list[str]](), 0
-    for name, width in _FIELDS.items():
-        begin, first = begin + width * signals, begin
-        fields[name] = [_text(texts[at : at + width]) for at in range(first, begin, width)]
+    spans = zip(_FIELDS.items(), accumulate(_FIELDS.values(), initial=0), strict=False)
+    fields = {name: [_text(texts[signals * begin + n * width :][:width]) for n in range(signals)]
+              for (name, width), begin in spans}  # fmt: skip
     length, record_s, stated = int(head[184:192]), float(head[244:252]), int(head[236:244])
     counts, is_bdf = [int(count) for count in fields["count"]], head[:1] == b"\xff"
     record = np.dtype([(f"{n}", "u1", (count, 3)) if is_bdf else (f"{n}", "<i2", (count,))

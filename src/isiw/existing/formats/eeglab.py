@@ -18,9 +18,7 @@ from isiw.opening import opened
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 
-_ASSUMED: Final = (
-    "Files of EEGLAB say no unit, and µV are usual. If the numbers are in another unit, say --unit mV or --unit V."
-)
+_ASSUMED: Final = "Files of EEGLAB say no unit, and µV are usual. If another is right, say --unit mV or --unit V."
 
 
 def read(path: Path, layout: Layout) -> Contents:

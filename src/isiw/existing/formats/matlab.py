@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +11,8 @@ from isiw.errors import InvalidValueError
 from isiw.existing import frames, quantities
 from isiw.existing.formats import columns
 from isiw.existing.formats.contents import Contents, Track, parted
-from isiw.existing.layout import EMG_UNITS, Layout, letters
+from isiw.existing.layout import EMG_UNITS, WORDS, Layout, letters
 from isiw.lazy import pd
-
-_RATES: Final = frozenset({"fs", "srate", "samplerate", "samplingrate", "samplingfrequency", "sfreq", "rate", "ratehz"})
-_PERIODS: Final = frozenset({"interval", "samplinginterval", "sampleinterval", "dt"})
 
 
 def read(path: Path, layout: Layout) -> Contents:
@@ -31,16 +28,14 @@ def read(path: Path, layout: Layout) -> Contents:
     pulse_at_ms = columns.required(layout, "pulse_at_ms", f"the time of the pulse in a sweep of {source}")
     beside, sweeps = frames.of_vectors(arrays, layout), np.asarray(arrays[name], dtype=np.float64)
     if sweeps.ndim != 2 or (count := len(beside)) not in sweeps.shape:
-        raise InvalidValueError(
-            f"the sweeps of {source} are not as many as its ISIs, in a matrix",
-            got=f"{' × '.join(map(str, sweeps.shape))} samples and {len(beside)} ISIs",
-            remedy="Save a row or a column for each ISI.",
-        )
+        what = f"the sweeps of {source} are not as many as its ISIs, in a matrix"
+        got = f"{' × '.join(map(str, sweeps.shape))} samples and {len(beside)} ISIs"
+        raise InvalidValueError(what, got=got, remedy="Save a row or a column for each ISI.")
     for other, array in arrays.items():
         number = float(array.item()) if array.size == 1 and array.dtype.kind in "fiu" else 0.0
-        if number and letters(other) in _RATES:
+        if number and letters(other) in WORDS["rates"]:
             columns.require_rate(rate_hz, number, f"{other!r} of {source}")
-        if number > 0 and letters(other) in _PERIODS:
+        if number > 0 and letters(other) in WORDS["periods"]:
             columns.require_period(rate_hz, number, None, f"{other!r} of {source}")
         if array.size == sweeps.size // count != count:
             _require_zero(other, array.ravel(), rate_hz, pulse_at_ms, source)
@@ -60,6 +55,5 @@ def _require_zero(name: str, times: Any, rate_hz: float, pulse_at_ms: float, sou
     if zero_ms > 0 and abs(zero_ms - pulse_at_ms) > 1.5e3 / rate_hz:
         what = f"the pulse does not come where {name!r} of {source} is 0"
         remedy = "Correct pulse_at_ms in the layout; if it is right, leave that vector out of the file."
-        raise InvalidValueError(
-            what, got=f"{pulse_at_ms:g} ms", expected=f"{zero_ms:g} ms after the first sample", remedy=remedy
-        )
+        expected = f"{zero_ms:g} ms after the first sample"
+        raise InvalidValueError(what, got=f"{pulse_at_ms:g} ms", expected=expected, remedy=remedy)

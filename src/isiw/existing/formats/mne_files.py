@@ -40,9 +40,8 @@ def _require_whole_markers(path: Path) -> None:
         if re.match(r"Mk\d+=", line) and len(fields) > 4 and not dated:
             what = f"a comma stands in the text of a marker in {markers.name}, where it must be coded"
             remedy = "Write that into the .vmrk with an editor; what wrote the file left it out."
-            raise InvalidValueError(
-                what, got=line.strip(), expected=r"\1 in its place, as BrainVision has it", remedy=remedy
-            )
+            expected = r"\1 in its place, as BrainVision has it"
+            raise InvalidValueError(what, got=line.strip(), expected=expected, remedy=remedy)
 
 
 def _text(path: Path) -> str:

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, text_of
-from isiw.existing.formats.stamps import clocked
+from isiw.existing.formats.contents import Contents, Stretch, Track, clocked, events_of, text_of
 from isiw.existing.layout import Layout
 from isiw.lazy import pd
 from isiw.text.named_code import library
@@ -51,8 +50,8 @@ def _channels(series: Any, held: Any) -> Iterator[Track]:
         rate_hz, start_s = float(series.rate), float(series.starting_time or 0.0)
         stretches: tuple[Stretch, ...] = (Stretch(0, len(series.data), start_s),)
     else:
-        of_series = clocked(np.asarray(series.timestamps[:], dtype=np.float64), None, f"the series {series.name}")
-        rate_hz, stretches = of_series.rate_hz, of_series.stretches
+        times_s = np.asarray(series.timestamps[:], dtype=np.float64)
+        rate_hz, stretches, _ = clocked(times_s, None, f"the series {series.name}")
     of_each = getattr(series, "channel_conversion", None)
     for channel in range(max(1, count)):
         factor = float(series.conversion or 1.0) * (1.0 if of_each is None else float(of_each[channel]))

@@ -19,8 +19,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from isiw.existing.formats.contents import Contents, Track, events_of, text_of
-from isiw.existing.formats.stamps import clocked
+from isiw.existing.formats.contents import Contents, Track, clocked, events_of, text_of
 from isiw.existing.layout import Layout
 from isiw.opening import opened
 from isiw.text.named_code import library
@@ -49,10 +48,11 @@ def read(path: Path, _layout: Layout) -> Contents:
         if own.has_numbers:
             own.rows = np.asarray(values, dtype=np.int64).tolist()
             own.firsts = [0, *accumulate(count for _, _, count in own.rows)]
-            clock = clocked(times_s, own.rate_hz, f"the stream {own.name}", np.array(own.firsts[:-1]), own.firsts[-1])
-            notes += clock.notes
+            firsts = np.array(own.firsts[:-1])
+            rate_hz, stretches, said = clocked(times_s, own.rate_hz, f"the stream {own.name}", firsts, own.firsts[-1])
+            notes += said
             for n, (label, unit, kind) in enumerate(own.channels()):
-                tracks.append(Track(label, clock.rate_hz, clock.stretches, partial(own.read, n), unit, kind))
+                tracks.append(Track(label, rate_hz, stretches, partial(own.read, n), unit, kind))
         elif own.form.startswith(("string", "int")) or any(word in own.kind for word in _OF_MARKERS):
             rows += [(text_of(*one), at, 0.0) for one, at in zip(values, times_s.tolist(), strict=True)]
     return Contents(path.name, tuple(tracks), events_of(rows), notes=tuple(notes))  # no EMG has numbers at no rate

@@ -1,4 +1,4 @@
-"""Spike2 up to version 7 (.smr): waveforms with their pauses, events, levels and markers with codes or texts."""
+"""Spike2 (.smr up to version 7, .smrx later): waveforms with their pauses, events, levels, and markers."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from isiw.types import FloatArray
 
 _LEVEL, _MARKER, _TEXTS = 4, 5, 8  # a level's events are both of its edges; a marker has four bytes, or a text
 _EVER_S: Final = 1e6
+_WAVES, _EVENTS, _MARKS, _TEXT_MARKS = {1, 9}, {2, 3}, {5}, {8}  # sonpy's types of channels
 
 
 def read(path: Path, _layout: Layout) -> Contents:
@@ -61,3 +62,31 @@ def _events(raw: Any, index: int) -> list[tuple[str, float, float]]:
         if math.isfinite(at_s):
             rows.append((name, at_s, 0.0))
     return rows
+
+
+def smrx(path: Path, _layout: Layout) -> Contents:
+    """The waveforms, events and markers of a file of Spike2 8 and later, by CED's sonpy."""
+    sonpy = library("sonpy.lib", "import")
+    held = sonpy.SonFile(str(path), bReadOnly=True)
+    tick_s, end = held.GetTimeBase(), held.MaxTime()
+    tracks, rows = list[Track](), list[tuple[str, float, float]]()
+    for channel in range(held.MaxChannels()):
+        kind, title = int(held.ChannelType(channel)), held.GetChannelTitle(channel)
+        if kind in _WAVES:
+            step = held.ChannelDivide(channel)
+            stretches, parts, first = list[Stretch](), list[FloatArray](), 0
+            at = held.FirstTime(channel, 0, end)
+            while 0 <= at <= end:
+                values = np.asarray(held.ReadFloats(channel, 2**22, at), dtype=np.float64)
+                stretches.append(Stretch(first, len(values), at * tick_s))
+                parts, first = [*parts, values], first + len(values)
+                at = held.FirstTime(channel, at + len(values) * step, end)
+            whole, unit = np.concatenate(parts) if parts else np.empty(0), held.GetChannelUnits(channel)
+            tracks.append(Track.of_values(title, 1 / (step * tick_s), stretches, whole, unit))
+        elif kind in _EVENTS:
+            rows += [(title, at * tick_s, 0.0) for at in held.ReadEvents(channel, 2**20, 0)]
+        elif kind in _MARKS:
+            rows += [(f"{title} {one.Code1}", one.Tick * tick_s, 0.0) for one in held.ReadMarkers(channel, 2**20, 0)]
+        elif kind in _TEXT_MARKS:
+            rows += [(one.Text, one.Tick * tick_s, 0.0) for one in held.ReadTextMarks(channel, 2**20, 0)]
+    return Contents(path.name, tuple(tracks), events_of(rows))
