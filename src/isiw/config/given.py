@@ -78,6 +78,14 @@ def is_table(path: Path) -> bool:
     return path.suffix.lower() == ".csv"
 
 
+def tables_of(config: RunConfig) -> list[Path]:
+    """The tables of earlier pulses, each once."""
+    tables = [path.resolve() for path in config.earlier if is_table(path)]
+    if twice := next((path for path in tables if tables.count(path) > 1), None):
+        raise ConfigError("a table of earlier pulses is named twice", got=str(twice), remedy="Name it once.")
+    return tables
+
+
 def pulses_of_table(path: Path) -> tuple[Trial, ...]:
     """The pulses of TMS alone in a table of intensities and amplitudes, in the order of its rows.
 

@@ -20,6 +20,7 @@ from isiw.config.given import (
     searches_after,
     searches_sentence,
     sessions_after,
+    tables_of,
 )
 from isiw.config.run import RunConfig, limits_for
 from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
@@ -186,7 +187,7 @@ def earlier_trials(config: RunConfig, device: DeviceInfo) -> Before:
                 remedy="Leave this file out.",
             )
     trials = [*given_pulses(sorted(searches, key=lambda search: search.header.created))]
-    trials += [pulse for path in _tables(config) for pulse in pulses_of_table(path)]
+    trials += [pulse for path in tables_of(config) for pulse in pulses_of_table(path)]
     changed: set[int] = set()
     for record in records:
         before = before_of(record, trials)
@@ -198,14 +199,6 @@ def earlier_trials(config: RunConfig, device: DeviceInfo) -> Before:
 def _logs(config: RunConfig) -> list[Path]:
     """The logs of earlier trials."""
     return [path for path in config.earlier if not is_table(path)]
-
-
-def _tables(config: RunConfig) -> list[Path]:
-    """The tables of earlier pulses, each once."""
-    tables = [path.resolve() for path in config.earlier if is_table(path)]
-    if twice := next((path for path in tables if tables.count(path) > 1), None):
-        raise ConfigError("a table of earlier pulses is named twice", got=str(twice), remedy="Name it once.")
-    return tables
 
 
 def imported_said(config: RunConfig) -> str:
