@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 import tomllib
+from functools import cache
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).parents[1]
 MADE = {"reference", "results", "project"}
@@ -21,39 +20,44 @@ def name(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
+@cache
+def texts() -> dict[str, str]:
+    """All that may cite, by its name."""
+    return {name(path): path.read_text("utf-8") for path in [*SOURCES, *TEXTS]}
+
+
+@cache
 def defined() -> set[str]:
-    return set(re.findall(r"^- \*\*\[(\w+)\]\*\*", (ROOT / "docs" / "references.md").read_text("utf-8"), re.MULTILINE))
+    return set(re.findall(r"^- \*\*\[(\w+)\]\*\*", texts()["docs/references.md"], re.MULTILINE))
 
 
-@pytest.mark.parametrize("path", TEXTS, ids=name)
-def test_every_link_of_a_page_leads_somewhere(path: Path) -> None:
-    for target in re.findall(r"\]\((?!http|#)([^)#]+)", path.read_text("utf-8")):
-        linked = path.parent / target
-        made = (
-            linked.resolve().is_relative_to(ROOT / "docs")
-            and linked.resolve().relative_to(ROOT / "docs").parts[0] in MADE
-        )
-        assert made or linked.exists(), target  # Sphinx checks what it makes
+def test_every_link_of_a_page_leads_somewhere() -> None:
+    targets = [(path, each) for path in TEXTS for each in re.findall(r"\]\((?!http|#)([^)#]+)", texts()[name(path)])]
+    assert [
+        (name(path), each) for path, each in targets if not (made(path.parent / each) or (path.parent / each).exists())
+    ] == []
 
 
-@pytest.mark.parametrize("path", DECISIONS, ids=name)
-def test_a_decision_has_a_status_and_a_date(path: Path) -> None:
-    assert re.search(r"\A# \d+\. .+\n\nStatus: [a-z][^·]+ · Date: \d{4}-\d{2}-\d{2}\n", path.read_text("utf-8"))
+def made(linked: Path) -> bool:
+    """Whether Sphinx makes it, which checks it then."""
+    docs, linked = ROOT / "docs", linked.resolve()
+    return linked.is_relative_to(docs) and linked.relative_to(docs).parts[0] in MADE
 
 
-@pytest.mark.parametrize("path", [*SOURCES, *TEXTS], ids=name)
-def test_what_is_cited_is_among_the_references(path: Path) -> None:
-    assert set(KEY.findall(path.read_text("utf-8"))) <= defined()
+def test_a_decision_has_a_status_and_a_date() -> None:
+    head = re.compile(r"# \d+\. .+\n\nStatus: [a-z][^·]+ · Date: \d{4}-\d{2}-\d{2}\n")
+    assert [name(path) for path in DECISIONS if not head.match(texts()[name(path)])] == []
+
+
+def test_what_is_cited_is_among_the_references() -> None:
+    assert {
+        (where, key) for where, text in texts().items() for key in KEY.findall(text) if key not in defined()
+    } == set()
 
 
 def test_every_reference_is_cited_somewhere() -> None:
-    cited = {key for path in [*SOURCES, *TEXTS] if path.name != "references.md" for key in cited_in(path)}
-    assert defined() - cited == set()
-
-
-def cited_in(path: Path) -> set[str]:
-    text = path.read_text("utf-8")
-    return {key for key in defined() if f"[{key}" in text or f"; {key}" in text}
+    citing = "\n".join(text for where, text in texts().items() if where != "docs/references.md")
+    assert {key for key in defined() if f"[{key}" not in citing and f"; {key}" not in citing} == set()
 
 
 def test_the_picture_of_the_architecture_has_every_room() -> None:

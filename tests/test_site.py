@@ -6,6 +6,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+from functools import cache
 from typing import Any
 
 import pytest
@@ -44,11 +45,13 @@ def command_names(group: Any, before: str = "isiw") -> set[str]:
     return set().union(*(command_names(inner, f"{before} {name}") for name, inner in parts.items()))
 
 
-REFERENCE = dict(api.pages())
+@cache
+def reference() -> dict[str, str]:
+    return dict(api.pages())
 
 
 def test_every_public_name_is_in_the_reference() -> None:
-    described = set(re.findall(r"^(?:\.\. [\w:]+:: |``)(isiw[\w.]+)", "\n".join(REFERENCE.values()), re.MULTILINE))
+    described = set(re.findall(r"^(?:\.\. [\w:]+:: |``)(isiw[\w.]+)", "\n".join(reference().values()), re.MULTILINE))
     assert public() - described == set()
 
 
@@ -109,7 +112,7 @@ def test_every_field_of_a_log_has_a_meaning() -> None:
 
 
 def test_a_protocol_that_is_called_shows_how() -> None:
-    entry = REFERENCE["api/isiw.acquisition.rst"].partition("isiw.acquisition.AcquisitionFunction\n")[2]
+    entry = reference()["api/isiw.acquisition.rst"].partition("isiw.acquisition.AcquisitionFunction\n")[2]
     assert "   :special-members: __call__" in entry.partition("\n\n")[0].splitlines()
 
 

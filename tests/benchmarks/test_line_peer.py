@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +15,7 @@ import isiw
 
 
 @pytest.mark.slow
-def test_nothing_is_lost_or_given_twice_in_thirty_sessions(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    caplog.set_level(logging.ERROR, "isiw.devices.transports")
+def test_nothing_is_lost_or_given_twice_in_thirty_sessions(tmp_path: Path) -> None:
     counts, lies = Counter[str](), Counter[Lie]()
     for seed in range(30):
         peer, happened = run(tmp_path / f"{seed}.mcap", 30_000 + seed, 6, 0.03)

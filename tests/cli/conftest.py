@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import pytest
+from matplotlib.figure import Figure
 from typer import testing
 from typer.main import get_command
 from typer.testing import CliRunner, Result
@@ -37,6 +38,17 @@ def _frames_alone(frames_alone: None) -> None:
     """Most tests of commands are about something else than the picture that each of them makes."""
 
 
+def _blank(*_: object, **__: object) -> Figure:
+    return Figure()
+
+
+@pytest.fixture
+def blank_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sessions are drawn as empty figures, for tests that run many; what is drawn is tested in other modules."""
+    if request.node.get_closest_marker("needs_pictures") is None:
+        monkeypatch.setattr("isiw.plots.session.session_figure", _blank)
+
+
 @pytest.fixture
 def isiw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     """Runs isiw in an empty folder."""
@@ -61,7 +73,9 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The log of a short session."""
     folder = tmp_path_factory.mktemp("finished")
     (folder / "short.toml").write_text(SHORT)
-    result = CliRunner().invoke(app, ["run", str(folder / "short.toml"), "--log", str(folder / "s.mcap")])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("isiw.plots.session.session_figure", _blank)
+        result = CliRunner().invoke(app, ["run", str(folder / "short.toml"), "--log", str(folder / "s.mcap")])
     assert result.exit_code == 0, result.output
     return folder / "s.mcap"
 

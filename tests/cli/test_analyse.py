@@ -11,6 +11,8 @@ import isiw as library
 from existing.conftest import reads_here
 from existing.writers import as_edf
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 if TYPE_CHECKING:
     from cli.conftest import Command
 

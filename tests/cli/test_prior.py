@@ -11,7 +11,7 @@ from isiw.cli.console import DAMAGED
 from isiw.log.record import read_session
 from logs import damage
 
-pytestmark = pytest.mark.usefixtures("few_sweeps")
+pytestmark = pytest.mark.usefixtures("few_sweeps", "blank_pictures")
 
 
 @pytest.fixture(scope="module")

@@ -18,6 +18,8 @@ from isiw.cli import app
 from isiw.config import load_config, session_for
 from isiw.log.record import read_session
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 
 @pytest.fixture
 def isiw(isiw: Command) -> Iterator[Command]:

@@ -18,6 +18,8 @@ from isiw.trials import Status
 from known import known
 from logs import blocks_of
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 ROBOT = """
 seed = 3
 [device]

@@ -16,6 +16,8 @@ from isiw.session.loop import Session
 from known import known
 from scripted import ScriptedDevice, scripted_strategy
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 
 @pytest.mark.needs_pictures
 def test_run_ends_with_a_statement_a_log_and_a_picture(isiw: Command, short: Path, tmp_path: Path) -> None:

@@ -2,9 +2,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from cli.conftest import Command
 from isiw.log.record import read_session
 from isiw.strategy.catalogue import list_strategies
+
+pytestmark = pytest.mark.usefixtures("blank_pictures")
 
 
 def test_a_strategys_settings_are_listed_as_a_configuration_has_them_with_unit_and_meaning(isiw: Command) -> None:

@@ -51,8 +51,13 @@ def exported(log: Path, tmp_path: Path, **options: Any) -> tuple[Exported, pd.Da
     return told, pd.read_csv(tmp_path / "out" / "sessions.csv")
 
 
-@pytest.mark.parametrize("name", ["a.mcap", "z.mcap", "backup/s.mcap", "s.mcap.damaged", "s.mcap.damaged1"])
-@pytest.mark.parametrize("harm", [lose_a_trial, lose_the_end, cut])
+@pytest.mark.parametrize(
+    ("name", "harm"),
+    [
+        *[(name, lose_a_trial) for name in ("a.mcap", "z.mcap", "backup/s.mcap", "s.mcap.damaged", "s.mcap.damaged1")],
+        *[(name, harm) for name in ("a.mcap", "z.mcap") for harm in (lose_the_end, cut)],
+    ],
+)
 def test_a_session_that_is_there_whole_and_damaged_is_exported_once_from_the_whole_log(
     log: Path, tmp_path: Path, name: str, harm: Callable[[Path], None]
 ) -> None:

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import pytest
-from benchmarks.server_tries import tried
 
 from isiw.server import Rules, make_app
 from server.serving import BEARER, TOKEN, client_of
@@ -21,6 +20,8 @@ def test_the_committed_description_is_todays(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_no_call_fails_the_server_or_is_answered_otherwise_than_described(tmp_path: Path) -> None:
+    from benchmarks.server_tries import tried  # noqa: PLC0415 - what it imports takes half a second
+
     with client_of(tmp_path) as client:
         answers, wrong = tried(str(client.base_url), BEARER, examples=4)
     assert wrong == []

@@ -47,9 +47,16 @@ def given(log: Path) -> list[tuple[float | None, bool]]:
     return [(intent.isi_ms, intent.tap_alone) for intent in read_session(log).intents]
 
 
-def test_intervals_and_rests_are_those_of_the_protocol(log: Path) -> None:
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a session in which all went well."""
+    log = tmp_path_factory.mktemp("undisturbed") / "s.mcap"
     session(log).run()
-    t_s = [intent.t_s for intent in read_session(log).intents]
+    return log
+
+
+def test_intervals_and_rests_are_those_of_the_protocol(undisturbed: Path) -> None:
+    t_s = [intent.t_s for intent in read_session(undisturbed).intents]
     gaps = [after - before for before, after in pairwise(t_s)]
     wanted = [schedule.interval_s(MIXED, trial, 5) for trial in range(1, len(t_s))]
     assert gaps == pytest.approx(wanted)
@@ -101,11 +108,8 @@ def test_what_is_learnt_is_in_the_order_of_delivery(log: Path) -> None:
 
 @pytest.mark.parametrize("last", [3, pytest.param(11, marks=pytest.mark.slow), 12])
 def test_a_killed_and_resumed_session_has_the_intervals_and_controls_of_an_undisturbed_one(
-    log: Path, tmp_path: Path, last: int
+    log: Path, undisturbed: Path, last: int
 ) -> None:
-    undisturbed = tmp_path / "undisturbed.mcap"
-    session(undisturbed).run()
-
     def kill(update: SessionUpdate) -> None:
         if update.trial.index == last:
             raise KilledHereError

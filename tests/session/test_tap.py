@@ -78,9 +78,15 @@ def test_none_is_given_where_the_device_cannot_or_nobody_wants_it(
     assert not any(stimulus.tap_alone for stimulus in rig.delivered)
 
 
-def test_earlier_amplitudes_are_corrected_in_the_log_and_learnt_again(log: Path) -> None:
-    session = ran(TapRig(reflex(0.3), mep_mv=silent), log, few(), protocol=NO_TAPS)
-    record = read_session(log)
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """Of a person without any MEP, whose tap evokes a reflex."""
+    log = tmp_path_factory.mktemp("whole") / "s.mcap"
+    return ran(TapRig(reflex(0.3), mep_mv=silent), log, few(), protocol=NO_TAPS)
+
+
+def test_earlier_amplitudes_are_corrected_in_the_log_and_learnt_again(whole: Session) -> None:
+    session, record = whole, read_session(whole.log_path)
     corrections = [event for event in record.events if event.kind == "correction"]
     assert corrections
     assert record.table == session.trials
@@ -105,7 +111,7 @@ def test_a_resumed_session_corrects_and_asks_as_an_uninterrupted_one(log: Path, 
 
 
 def test_a_session_that_ends_between_a_trial_and_its_corrections_has_them_once_it_is_resumed(
-    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    log: Path, whole: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def made() -> TapRig:
         return TapRig(reflex(0.3), mep_mv=silent)
@@ -113,7 +119,6 @@ def test_a_session_that_ends_between_a_trial_and_its_corrections_has_them_once_i
     def dies(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    whole = ran(made(), tmp_path / "whole.mcap", few(), protocol=NO_TAPS)
     with monkeypatch.context() as dying:
         dying.setattr(steps, "correction", dies)
         with pytest.raises(KeyboardInterrupt):
@@ -148,7 +153,7 @@ def test_people_without_a_window_get_no_sure_one_from_a_reflex(
 ) -> None:
     sure = []
     for seed in range(5):
-        session = of_a_reflex(size_mv, seed, tmp_path, protocol)
+        session = of_a_reflex(size_mv, seed, tmp_path, protocol, particles=300)
         sure.append(known(session.strategy.estimate().probability) >= 0.9)
     assert not any(sure)  # of five: where every second is, 97 % of such tests fail
 
@@ -202,8 +207,9 @@ def of_a_reflex(
     protocol: VisitProtocol,
     space: DesignSpace = IMPACT,
     max_trials: int = 40,
+    **settings: Any,
 ) -> Session:
     """A session of a person without any MEP, whose tap evokes a reflex."""
-    strategy = make_strategy(space=space, seed=seed, max_trials=max_trials)
+    strategy = make_strategy(space=space, seed=seed, max_trials=max_trials, **settings)
     rig = TapRig(reflex(size_mv, start_ms=20.0 + 8 * seed), seed=seed, mep_mv=silent)
     return ran(rig, folder / f"{seed}.mcap", strategy, protocol=protocol)

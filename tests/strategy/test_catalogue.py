@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import pytest
@@ -21,6 +22,7 @@ from isiw.models.particles.swarm import Moving
 from isiw.models.protocol import ResponseModel
 from isiw.models.shared.scales import Scale
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
+from isiw.strategy.strategy import Strategy
 from known import instance, known
 from quick import quick
 
@@ -29,13 +31,19 @@ PARTICLES = [name for name in NAMES if isinstance(settings_for(name).model, Part
 FEW: dict[str, Any] = {"particles": 64}
 
 
-def asks(name: str, seed: int, meps_mv: tuple[float, ...] = (0.02, 0.1)) -> list[float]:
-    strategy = make_strategy(name, seed=seed, **quick(name))
+def after(
+    name: str, space: DesignSpace = VALVE_SPACE, seed: int = 2, meps_mv: tuple[float, ...] = (0.02, 0.1)
+) -> tuple[Strategy, list[float]]:
+    """A strategy after some trials, and all that it has asked."""
+    strategy = make_strategy(name, space=space, seed=seed, **quick(name))
     asked = []
     for mep_mv in meps_mv:
         asked.append(strategy.ask())
         strategy.tell(asked[-1], mep_mv)
-    return [*asked, strategy.ask()]
+    return strategy, [*asked, strategy.ask()]
+
+
+tried = cache(after)
 
 
 def test_every_named_strategy_is_described_in_a_sentence() -> None:
@@ -45,11 +53,9 @@ def test_every_named_strategy_is_described_in_a_sentence() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
-def test_every_named_strategy_asks_learns_and_decides(name: str, space: Any) -> None:
-    strategy = make_strategy(name, space=space, seed=1, **quick(name))
-    for mep_mv in (0.02, 0.08):
-        strategy.tell(strategy.ask(), mep_mv)
-    assert strategy.ask() in space.grid_ms
+def test_every_named_strategy_asks_learns_and_decides(name: str, space: DesignSpace) -> None:
+    strategy, asked = tried(name, space)
+    assert asked[-1] in space.grid_ms
     probability = strategy.estimate().probability
     assert probability is None or 0 <= probability <= 1
     assert strategy.decision().reason
@@ -66,17 +72,17 @@ def test_every_named_strategy_is_made_again_from_its_recipe(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_same_name_and_seed_give_the_same_asks(name: str) -> None:
-    assert asks(name, seed=2) == asks(name, seed=2)
+    assert after(name, VALVE_SPACE)[1] == tried(name, VALVE_SPACE)[1]
 
 
 @pytest.mark.parametrize("name", ["default", "random"])
 def test_another_seed_gives_other_asks(name: str) -> None:
-    assert asks(name, seed=2) != asks(name, seed=3)
+    assert after(name, seed=3)[1] != tried(name, VALVE_SPACE)[1]
 
 
 def test_designs_that_do_not_look_at_the_responses_do_not() -> None:
     for name in ("even", "random"):
-        assert asks(name, 2, (0.02, 0.02)) == asks(name, 2, (0.3, 0.3))
+        assert after(name, meps_mv=(0.02, 0.02))[1] == after(name, meps_mv=(0.3, 0.3))[1]
 
 
 @pytest.mark.parametrize("name", PARTICLES)
@@ -172,23 +178,10 @@ def test_an_unknown_setting_of_the_prior_names_the_known_ones() -> None:
         make_strategy(prior={"profile": {"p_windows": 0.5}})
 
 
-@pytest.mark.parametrize(
-    ("settings", "what"),
-    [
-        ({"seed": -1}, "seed"),
-        ({"max_trials": 0}, "max_trials"),
-        ({"stop_width_ms": 0.0}, "width_ms"),
-        ({"stop_no_window": 0.0}, "stop_no_window"),
-        ({"stop_no_window": 1.5}, "stop_no_window"),
-        ({"particles": 1}, "particles"),
-    ],
-)
-@pytest.mark.parametrize("name", ["default", "random"])
-def test_an_invalid_setting_is_refused_when_the_strategy_is_made(
-    name: str, settings: dict[str, Any], what: str
-) -> None:
-    with pytest.raises(InvalidValueError, match=what):
-        make_strategy(name, **settings)
+@pytest.mark.parametrize("settings", [{"stop_no_window": 1.5}, {"particles": 1}])
+def test_an_invalid_setting_is_refused_when_the_strategy_is_made(settings: dict[str, Any]) -> None:
+    with pytest.raises(InvalidValueError, match=next(iter(settings))):
+        make_strategy(**settings)
 
 
 def test_the_fewest_particles_allowed_do_learn() -> None:
@@ -227,12 +220,8 @@ def test_a_regression_gives_up_after_99_iterations(name: str) -> None:
         ("nr", {"initial": 1}, "at least 2"),
         ("nr", {"initial": 6.0}, "whole number"),
         ("svmr", {"acquisition": "best"}, "acquisition"),
-        ("gpr", {"floor": "cut"}, "floor"),
         ("gpr", {"stop_edges": "none"}, "edges"),
-        ("pf", {"particles": 1}, "particles"),
-        ("pf", {"stop_sd_ms": 0.0}, "sd_ms"),
         ("incremental", {"rule": "eye"}, "rule"),
-        ("incremental", {"quiet_ms": -1.0}, "quiet_ms"),
     ],
 )
 def test_an_invalid_setting_of_the_dissertations_is_refused(name: str, settings: dict[str, Any], what: str) -> None:

@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import tempfile
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from isiw.design import DesignSpace
 from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
 from isiw.findings import Kind
+from isiw.log.headers import Header
 from isiw.log.new_verdicts import correction
 from isiw.log.record import read_session
 from isiw.log.schema import Correction
@@ -75,10 +77,14 @@ def told(trials: TrialTable) -> tuple[Any, ...] | None:
     return said(strategy)
 
 
+@cache
+def header() -> Header:
+    return analysed(Delivered(TrialTable(tuple(SEEN[:1])), "impact", subject="P1"), made()).record.header
+
+
 def examined(trials: TrialTable, corrected: Sequence[int], folder: Path) -> tuple[Any, ...]:
     """As a session learns them, with its log; a correction comes at the end."""
-    record = analysed(Delivered(trials, "impact", subject="P1"), made()).record
-    with LogWriter.create(folder / "P1.mcap", record.header) as log:
+    with LogWriter.create(folder / "P1.mcap", header()) as log:
         examination = examination_of(made(), Sink(log=log))
         for trial in trials:
             examination.came(trial)
@@ -140,8 +146,14 @@ CASES: dict[str, tuple[list[Trial], tuple[int, ...]]] = {
 }
 
 
+ALONE_IN_A_CASE = ("TMS alone", "taps alone", "lost", "corrected")
+"""What "pieces of all" has, too."""
+
+
 @pytest.mark.filterwarnings("ignore::isiw.errors.ImplausibleDataWarning")  # a loop of one's own is told what is odd
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=pytest.mark.slow) if case in ALONE_IN_A_CASE else case for case in CASES]
+)
 def test_each_way_to_learn_the_same_trials_says_the_same(case: str) -> None:
     trials, corrected = CASES[case]
     require_one_answer(TrialTable(tuple(trials)), corrected)

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import dask
 import pandas as pd
 import pytest
-from distributed import Client, LocalCluster
 
 from isiw.errors import StudyError
 from isiw.studies import DaskCluster, Failure, conduct
 from known import instance
 from studies.tiny import double, double_or_die, timeless, tiny
 
+if TYPE_CHECKING:
+    from distributed import Client, LocalCluster
+
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[LocalCluster]:
+    import dask  # noqa: PLC0415 - it takes half a second, which only the worker with these tests need spend
+    from distributed import LocalCluster  # noqa: PLC0415 - same
+
     few = {"distributed.scheduler.allowed-failures": 1}  # the death of a worker takes seconds
     with dask.config.set(few), LocalCluster(2, threads_per_worker=1, dashboard_address=":0") as cluster:
         yield cluster
@@ -25,6 +30,8 @@ def cluster() -> Iterator[LocalCluster]:
 
 @pytest.fixture(scope="module")
 def client(cluster: LocalCluster) -> Iterator[Client]:
+    from distributed import Client  # noqa: PLC0415 - same
+
     with Client(cluster) as client:
         yield client
 
@@ -67,6 +74,8 @@ def test_a_scheduler_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_the_loss_of_the_scheduler_ends_the_study_with_the_way_out() -> None:
+    from distributed import Client, LocalCluster  # noqa: PLC0415 - same
+
     with LocalCluster(n_workers=1, processes=False, dashboard_address=":0") as lost, Client(lost) as client:
         results = DaskCluster(client).results(double, [1] * 50)
         next(results)

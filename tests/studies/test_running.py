@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -33,7 +34,7 @@ from isiw.studies import (
 from isiw.studies import plan as plan_module
 from isiw.studies import running as running_module
 from isiw.studies import store as store_module
-from isiw.studies.plan import Engine, Unit
+from isiw.studies.plan import Unit
 from isiw.studies.running import unit_of_row
 from isiw.studies.sessions import SimulatedSession
 from isiw.studies.store import begin_store
@@ -47,6 +48,21 @@ def keys_run(study: Study, folder: Path, **how: Any) -> list[str]:
     keys: list[str] = []
     conduct(study, folder, on_done=lambda unit, _result: keys.append(unit.key), **how)
     return keys
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A finished study of each engine."""
+    folders = {engine: tmp_path_factory.mktemp(engine) / "s" for engine in ("single", "batched")}
+    conduct(tiny(), folders["single"])
+    conduct(tiny(engine="batched", batch=2), folders["batched"])
+    return folders
+
+
+@pytest.fixture
+def finished(folders: dict[str, Path], tmp_path: Path) -> Path:
+    """The folder of a finished study, which may be changed."""
+    return Path(shutil.copytree(folders["single"], tmp_path / "finished"))
 
 
 @pytest.fixture
@@ -63,28 +79,27 @@ def crash(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     return monkeypatch
 
 
-def test_a_study_has_one_row_a_mark_of_every_person_and_says_whose(tmp_path: Path) -> None:
-    rows = conduct(tiny(), tmp_path / "s").rows()
+def test_a_study_has_one_row_a_mark_of_every_person_and_says_whose(finished: Path) -> None:
+    rows = open_store(finished).rows()
     assert len(rows) == 2 * 2 * 3 * 2
     assert rows["unit"].iloc[0] == "even.gaussian.00000"
     assert rows.columns[:5].tolist() == ["strategy", "cohort", "person", "seed", "trial"]
-    assert open_store(tmp_path / "s").rows().equals(rows)
 
 
 def test_a_finished_study_has_nothing_left_to_run(tmp_path: Path) -> None:
-    assert len(keys_run(tiny(), tmp_path)) == 12
-    assert keys_run(tiny(), tmp_path) == []
+    rows = conduct(swept(), tmp_path).rows()
+    assert keys_run(swept(), tmp_path) == []
+    assert open_store(tmp_path).rows().equals(rows)
 
 
-def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(tmp_path: Path) -> None:
-    whole = timeless(conduct(tiny(), tmp_path / "whole").rows())
-    conduct(tiny(), tmp_path / "cut")
-    (lost,) = (tmp_path / "cut" / "parts").glob("even.gaussian.00001.*")
+def test_a_study_goes_on_with_what_is_missing_and_writes_over_what_was_cut_off(finished: Path) -> None:
+    whole = timeless(open_store(finished).rows())
+    (lost,) = (finished / "parts").glob("even.gaussian.00001.*")
     lost.rename(lost.with_name("even.gaussian.00001.part")).write_bytes(b"half of a pa")
-    assert len(open_store(tmp_path / "cut").rows()) == len(whole) - 2
-    assert keys_run(tiny(), tmp_path / "cut") == ["even.gaussian.00001"]
-    pd.testing.assert_frame_equal(timeless(open_store(tmp_path / "cut").rows()), whole)
-    assert not list((tmp_path / "cut").rglob("*.part"))
+    assert len(open_store(finished).rows()) == len(whole) - 2
+    assert keys_run(tiny(), finished) == ["even.gaussian.00001"]
+    pd.testing.assert_frame_equal(timeless(open_store(finished).rows()), whole)
+    assert not list(finished.rglob("*.part"))
 
 
 def test_a_folder_of_another_study_is_refused_with_what_differs(tmp_path: Path) -> None:
@@ -146,16 +161,16 @@ def test_a_strategy_that_crashes_is_reported_and_the_study_finishes(tmp_path: Pa
 
 
 @pytest.mark.parametrize("engine", ["single", "batched"])
-def test_a_replay_gives_identical_rows(tmp_path: Path, engine: Engine) -> None:
-    store = conduct(tiny(engine=engine, batch=2), tmp_path)
+def test_a_replay_gives_identical_rows(folders: dict[str, Path], engine: str) -> None:
+    store = open_store(folders[engine])
     for unit in store.study.units()[::3]:
         again = replay(store, unit.key)
         assert again.differing == ()
         assert len(again.kept) == len(again.again) == 2 * len(unit.sessions)
 
 
-def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path: Path) -> None:
-    store = conduct(tiny(engine="batched", batch=2), tmp_path)
+def test_a_replay_of_one_person_of_a_batch_compares_that_person(folders: dict[str, Path]) -> None:
+    store = open_store(folders["batched"])
     key, person = unit_of_row(store, 3)
     assert (key, person) == ("even.gaussian.00000-00001", 1)
     assert set(replay(store, key, person).again["person"]) == {1}
@@ -163,8 +178,8 @@ def test_a_replay_of_one_person_of_a_batch_compares_that_person(tmp_path: Path) 
         replay(store, key, 2)
 
 
-def test_a_replay_says_which_columns_differ(tmp_path: Path) -> None:
-    store = conduct(tiny(), tmp_path)
+def test_a_replay_says_which_columns_differ(finished: Path) -> None:
+    store = open_store(finished)
     unit, rows = store.unit("even.gaussian.00001"), store.rows()
     rows = rows[rows["unit"] == unit.key]
     store.keep(unit, rows.assign(f1=rows["f1"] + 0.1, ask_ms=0.0))

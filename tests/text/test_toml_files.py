@@ -72,6 +72,7 @@ def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path: Path) -> None:
         ".".join("k" * 50 for _ in range(200)) + " = 1",
         "x = " + "[" * 5000,
     ],
+    ids=["hexadecimal", "decimal", "binary", "tables", "quoted keys", "keys", "brackets"],
 )
 def test_what_is_too_large_to_read_is_refused_in_words_at_once(tmp_path: Path, text: str) -> None:
     file = tmp_path / "large.toml"

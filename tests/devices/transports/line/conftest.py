@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import logging
 from collections.abc import Iterator
 
 import pytest
@@ -29,3 +31,13 @@ def device(peer: PulsePeer) -> Iterator[isiw.LineDevice]:
         device = staged(made(at, line=HASTY))
         yield device
         device.unstage()
+
+
+@pytest.fixture
+def warned() -> Iterator[io.StringIO]:
+    """What the line says of what it throws away."""
+    texts, logger = io.StringIO(), logging.getLogger("isiw.devices.transports")
+    handler = logging.StreamHandler(texts)
+    logger.addHandler(handler)
+    yield texts
+    logger.removeHandler(handler)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import time
 import tracemalloc
 from contextlib import suppress
@@ -69,12 +70,12 @@ def test_an_answer_to_an_earlier_command_is_none_to_this_one() -> None:
 
 
 def test_without_numbers_what_came_before_the_command_is_thrown_away_and_said(
-    caplog: pytest.LogCaptureFixture,
+    warned: io.StringIO,
 ) -> None:
     asking, connection = line(b"ISI 50\n")
     connection.waiting = b"ISI 40\nIS"
     assert asking.ask(PLAIN, timeout_s=1.0)["isi_ms"] == "50"
-    assert "thrown away before a command: 2 lines, last ['ISI 40', 'IS']" in caplog.text
+    assert "thrown away before a command: 2 lines, last ['ISI 40', 'IS']" in warned.getvalue()
 
 
 def test_a_missing_answer_says_what_came_instead_and_the_connection_is_not_trusted_any_more() -> None:
