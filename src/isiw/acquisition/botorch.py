@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from isiw.lazy import torch
 from isiw.models.protocol import HasBotorchModel
-from isiw.types import Array
+from isiw.types import Array, FloatArray
 
 
 @dataclass(frozen=True)
@@ -33,4 +33,5 @@ class BotorchAcquisition:
         with torch.no_grad(), torch.random.fork_rng(devices=[]):
             torch.default_generator.manual_seed(self.seed)
             scores = [self.make(posterior.botorch_model(person))(inputs) for person in range(posterior.people)]
-        return torch.stack(scores).double().numpy()
+        found: FloatArray = torch.stack(scores).double().numpy()
+        return found

@@ -116,4 +116,5 @@ def stops_ms(space: DesignSpace, step_ms: float) -> FloatArray:
         return np.array(stops_ms)
     whole_ms = space.step_ms * math.ceil(step_ms / space.step_ms - 1e-9)
     stops = math.floor((space.high_ms - space.low_ms) / whole_ms + 1e-9) + 1
-    return space.low_ms + whole_ms * np.arange(stops, dtype=np.float64)
+    isis_ms: FloatArray = space.low_ms + whole_ms * np.arange(stops, dtype=np.float64)
+    return isis_ms

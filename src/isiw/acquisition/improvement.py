@@ -41,7 +41,8 @@ class LogExpectedImprovement:
         steps = (profiles - best) / scale
         # log softplus(x) is x itself far below the hinge, where softplus would underflow.
         log_hinge = np.where(steps < -15.0, steps, np.log(np.logaddexp(0.0, np.maximum(steps, -15.0))))
-        return scipy.special.logsumexp(log_hinge, axis=1, b=1.0 / profiles.shape[1]) + np.log(scale[..., 0])
+        score: Array = scipy.special.logsumexp(log_hinge, axis=1, b=1.0 / profiles.shape[1]) + np.log(scale[..., 0])
+        return score
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ class UpperConfidenceBound(Checked):
     def __call__(self, posterior: SamplesProfiles, isi_ms: Array) -> Array:
         """The upper bound of the expected MEP [mV], shape (b, t)."""
         profiles = posterior.profiles_mv(isi_ms)
-        return profiles.mean(axis=1) + self.width_sd * profiles.std(axis=1)
+        bound: Array = profiles.mean(axis=1) + self.width_sd * profiles.std(axis=1)
+        return bound
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,8 @@ class Thompson:
         profiles = posterior.profiles_mv(isi_ms)
         people, samples = profiles.shape[:2]
         rng = np.random.default_rng([self.seed, 1 + posterior.trials])  # [seed, 0] is the stream of seed
-        return profiles[np.arange(people), rng.integers(samples, size=people)]
+        sampled: Array = profiles[np.arange(people), rng.integers(samples, size=people)]
+        return sampled
 
 
 @dataclass(frozen=True)
@@ -91,4 +94,5 @@ class KnowledgeGradient:
         profiles = posterior.profiles_mv(isi_ms)
         ahead = lookahead(posterior.outcome_mass(isi_ms), profiles)
         later = (ahead.probability * ahead.mean.max(axis=-1)).sum(-1)
-        return later - profiles.mean(axis=1).max(axis=-1, keepdims=True)
+        gain: Array = later - profiles.mean(axis=1).max(axis=-1, keepdims=True)
+        return gain

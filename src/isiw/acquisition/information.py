@@ -33,7 +33,8 @@ class _CountedWindows(Posterior, ForeseesWindows, Protocol):
 
 def _entropy(mass: Array) -> Array:
     # Probabilities that are practically 0 add practically nothing.
-    return -(np.log(np.maximum(mass, 1e-30)) * mass).sum(-1)
+    entropy: Array = -(np.log(np.maximum(mass, 1e-30)) * mass).sum(-1)
+    return entropy
 
 
 def _foreseen(posterior: PredictsOutcomes, isi_ms: Array) -> Iterable[Singles | engine.Foreseen]:

@@ -26,7 +26,8 @@ _INV_SQRT_2PI = 0.3989422804014327
 def _margins_mv(posterior: SamplesProfiles, isi_ms: Array) -> Array:
     """By how much each sample is above the level of its window's edge [mV], shape (b, s, t)."""
     excess = posterior.profiles_mv(isi_ms) - posterior.baselines_mv()[..., None]
-    return excess - EDGE_LEVEL * np.maximum(excess.max(axis=-1, keepdims=True), 0.0)
+    margins: Array = excess - EDGE_LEVEL * np.maximum(excess.max(axis=-1, keepdims=True), 0.0)
+    return margins
 
 
 def expected_feasibility(mean: Array, sd: Array, band_sd: float = 2.0) -> Array:
@@ -37,12 +38,14 @@ def expected_feasibility(mean: Array, sd: Array, band_sd: float = 2.0) -> Array:
     inside = band_sd * (above - below)
     # By parts: the expected distance from the level, where the margin is inside the band.
     distance = z * (below + above - 2.0 * at) + 2.0 * _density(z) - _density(low) - _density(high)
-    return sd * (inside - distance)
+    feasibility: Array = sd * (inside - distance)
+    return feasibility
 
 
 def _density(z: Array) -> Array:
     """Of a standard Gaussian."""
-    return _INV_SQRT_2PI * np.exp(-0.5 * np.square(z))
+    density: Array = _INV_SQRT_2PI * np.exp(-0.5 * np.square(z))
+    return density
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,8 @@ class Straddle(Checked):
     def __call__(self, posterior: SamplesProfiles, isi_ms: Array) -> Array:
         """The reach of the margin's credible interval across zero [mV], shape (b, t)."""
         margins = _margins_mv(posterior, isi_ms)
-        return self.width_sd * margins.std(axis=1) - np.abs(margins.mean(axis=1))
+        reach: Array = self.width_sd * margins.std(axis=1) - np.abs(margins.mean(axis=1))
+        return reach
 
 
 @dataclass(frozen=True)
@@ -83,4 +87,5 @@ class IntegratedFeasibility(Checked):
         first, second = np.split(ahead.mean, 2, axis=-1)
         left_sd = np.sqrt(np.maximum(second - np.square(first), 0.0))
         later = expected_feasibility(centre[:, None] + first, left_sd, self.band_sd).sum(-1)
-        return now - (ahead.probability * later).sum(-1)
+        gain: Array = now - (ahead.probability * later).sum(-1)
+        return gain

@@ -107,7 +107,8 @@ def best_candidate(scores: Array, first: int = 0) -> IntArray:
     """Index of the best candidate for each person, shape (b,); a score that is not finite loses."""
     ranked = np.where(np.isfinite(scores), scores, -np.inf)
     from_first = np.concatenate((ranked[..., first:], ranked[..., :first]), axis=-1)
-    return (from_first.argmax(-1) + first) % scores.shape[-1]
+    best: IntArray = (from_first.argmax(-1) + first) % scores.shape[-1]
+    return best
 
 
 def own_plan(posterior: Posterior, acquisition: AcquisitionFunction) -> list[float]:

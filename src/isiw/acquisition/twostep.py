@@ -37,7 +37,8 @@ def expected_variance_reduction(mass: Array, values: Array, weights: Array | Non
     mean = values.mean(axis=1, keepdims=True) if weights is None else weights[:, None] @ values
     # Centred, so that a small reduction is not the difference of two large numbers.
     ahead = lookahead(mass, values - mean, weights)
-    return (ahead.probability * np.square(ahead.mean).sum(-1)).sum(-1)
+    reduction: Array = (ahead.probability * np.square(ahead.mean).sum(-1)).sum(-1)
+    return reduction
 
 
 @dataclass(frozen=True)
@@ -77,10 +78,12 @@ def _grouped(mass: Array, groups: int) -> Array:
     predicted = mass.mean(axis=1)
     middle = predicted.cumsum(-1) - 0.5 * predicted
     group = (middle * groups).astype(int).clip(0, groups - 1)
-    return mass @ np.eye(groups, dtype=mass.dtype)[group]
+    by_group: Array = mass @ np.eye(groups, dtype=mass.dtype)[group]
+    return by_group
 
 
 def _best_gain(mass: Array, masks: Array, weights: Array) -> Array:
     """The largest gain of any candidate among samples of given weights (b, s), shape (b,)."""
     share = weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
-    return expected_variance_reduction(mass, masks, share).max(-1)
+    gain: Array = expected_variance_reduction(mass, masks, share).max(-1)
+    return gain

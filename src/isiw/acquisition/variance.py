@@ -21,7 +21,8 @@ class ProfileVariance:
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Array) -> Array:
         """The variance at each ISI [mV²], shape (b, t)."""
-        return posterior.profiles_mv(isi_ms).var(axis=1)
+        variance: Array = posterior.profiles_mv(isi_ms).var(axis=1)
+        return variance
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,8 @@ class SweepPosterior(OfAmplitudes):
         """One sweep, from where it has come to; see `ProposesIsi`."""
         sweep = self._stops_ms.repeat(self.model.trials_per_isi)
         done = (~np.isnan(self.told.isi_ms)).sum(axis=-1, keepdims=True)
-        return sweep[(done + np.arange(len(sweep))) % len(sweep)].astype(np.float32)
+        plan_ms: Singles = sweep[(done + np.arange(len(sweep))) % len(sweep)].astype(np.float32)
+        return plan_ms
 
     def _means(self, trials: PersonTrials) -> tuple[FloatArray, FloatArray, FloatArray]:
         """ISIs swept so far, ascending, with mean MEP and standard error, (t,); a trial belongs to the nearest stop."""

@@ -144,7 +144,8 @@ class RegressionPosterior(OfAmplitudes):
 
     def _nearest(self, isi_ms: Array) -> IntArray:
         """Indices of the nearest grid points, shape (t,)."""
-        return np.abs(isi_ms[:, None] - self.space.grid_ms.astype(isi_ms.dtype)).argmin(-1)
+        nearest: IntArray = np.abs(isi_ms[:, None] - self.space.grid_ms.astype(isi_ms.dtype)).argmin(-1)
+        return nearest
 
     def window_masks(self, isi_ms: Array) -> Singles:
         """Sampled windows; see `SamplesWindows`."""
@@ -167,7 +168,8 @@ class RegressionPosterior(OfAmplitudes):
         values = (low - 3.0 * noise) + share * (high - low + 6.0 * noise)
         # Noise finer than the grid of values would fall between two of them.
         spread = np.maximum(np.maximum(noise, np.diff(values, axis=-1)[..., :1]), 1e-9)
-        return scipy.special.softmax(-0.5 * np.square((values - expected) / spread), axis=-1)
+        mass: Singles = scipy.special.softmax(-0.5 * np.square((values - expected) / spread), axis=-1)
+        return mass
 
     def condition(self, isi_ms: Array, mep_mv: Array) -> RegressionPosterior:
         """The fit with an imagined trial as well; see `Conditions`."""

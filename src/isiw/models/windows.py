@@ -135,7 +135,8 @@ class SampledProfiles(NamedTuple):
     @property
     def excess_mv(self) -> Array:
         """Largest enhancement at any ISI [mV], shape (s,)."""
-        return np.maximum(self.mep_mv.max(-1) - self.baseline_mv, 0.0)
+        excess_mv: Array = np.maximum(self.mep_mv.max(-1) - self.baseline_mv, 0.0)
+        return excess_mv
 
     @property
     def enhanced(self) -> BoolArray:
@@ -194,7 +195,8 @@ def _band_mv(profiles: SampledProfiles) -> FloatArray:
     place = (len(profiles.mep_mv) - 1) * np.array(_BAND)
     low, high = np.floor(place).astype(int), np.ceil(place).astype(int)
     ordered = np.sort(profiles.mep_mv, axis=0)
-    return ordered[low] + (place - low)[:, np.newaxis] * (ordered[high] - ordered[low]).astype(float)
+    band_mv: FloatArray = ordered[low] + (place - low)[:, np.newaxis] * (ordered[high] - ordered[low]).astype(float)
+    return band_mv
 
 
 def _magnitude(profiles: SampledProfiles) -> Magnitude | None:

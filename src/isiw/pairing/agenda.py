@@ -135,7 +135,8 @@ class Agenda:
         wanted = self._wanted(self._followed)
         centre = _centre(wanted)
         near = min(max(centre, self._centre_ms - self.plan.follow_ms), self._centre_ms + self.plan.follow_ms)
-        return np.clip(wanted + (near - centre), self._allowed_ms[0], self._allowed_ms[-1])
+        moved: FloatArray = np.clip(wanted + (near - centre), self._allowed_ms[0], self._allowed_ms[-1])
+        return moved
 
     def _wanted(self, followed: Followed) -> FloatArray:
         """ISIs of pairs, were there no bound [ms]: that of the largest enhancement, or those of the window."""

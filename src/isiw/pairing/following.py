@@ -83,7 +83,8 @@ class Movement(Checked):
     def changing(self) -> FloatArray:
         """The same of shares and levels together."""
         shares, levels = _steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling)
-        return np.kron(shares, levels).astype(float)
+        both: FloatArray = np.kron(shares, levels).astype(float)
+        return both
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +174,8 @@ class Followed:
         """SD of MEPs about their expectation, natural log: the larger, the more of them is enhancement."""
         base = self.baseline_mv[:, None, None]
         share = np.clip(1.0 - base / expected_mv, 0.0, 1.0)
-        return np.hypot((1.0 - share) * _ALONE_LOG_SD, share * self.log_sd)
+        spread: FloatArray = np.hypot((1.0 - share) * _ALONE_LOG_SD, share * self.log_sd)
+        return spread
 
     def _at(self, values: FloatArray, isi_ms: float) -> FloatArray:
         """Values at an ISI between those at which they are known, (s, shifts)."""
@@ -189,13 +191,15 @@ class Followed:
     @cached_property
     def _placed(self) -> FloatArray:
         """Weights of profiles, shifts and shares, (s, shifts, shares)."""
-        return self.weights.sum((0, -1))
+        placed: FloatArray = self.weights.sum((0, -1))
+        return placed
 
     @cached_property
     def enhancement_mv(self) -> FloatArray:
         """The expected enhancement at each ISI [mV], shape (t,)."""
         left = self._placed @ SHARES
-        return _mean(left, self.profiles_mv) - float(left.sum(-1) @ self.baseline_mv)
+        mean: FloatArray = _mean(left, self.profiles_mv) - float(left.sum(-1) @ self.baseline_mv)
+        return mean
 
     @cached_property
     def p_inside(self) -> FloatArray:
@@ -231,7 +235,8 @@ def _interval(values: FloatArray, weights: FloatArray, level: float) -> tuple[fl
 
 def _mean(weights: FloatArray, values: FloatArray) -> FloatArray:
     """The mean of values (..., t) over all but the last axis, shape (t,)."""
-    return weights.ravel() @ values.reshape(weights.size, -1)
+    mean: FloatArray = weights.ravel() @ values.reshape(weights.size, -1)
+    return mean
 
 
 def _shifted(values: FloatArray, isi_ms: FloatArray) -> FloatArray:

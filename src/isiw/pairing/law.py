@@ -124,4 +124,5 @@ def curvatures(pulses: Pulses, latents: FloatArray) -> FloatArray:
     )
     gradient = scores(again, moved.reshape(-1, number)).gradient.reshape(2, number, n, number)
     found = np.moveaxis((gradient[0] - gradient[1]) / (2.0 * _STEPS[:, None, None]), 0, 1)
-    return 0.5 * (found + np.swapaxes(found, 1, 2))
+    both: FloatArray = 0.5 * (found + np.swapaxes(found, 1, 2))
+    return both

@@ -141,7 +141,8 @@ def _kept(persistence: float, at: FloatArray) -> FloatArray:
     nodes = np.linspace(0.0, 1.0, 5)
     places = at[:, :1] + nodes * (at[:, 1:] - at[:, :1])
     apart = np.abs(places[:, None, :, None] - places[None, :, None, :])
-    return (persistence**apart).mean(axis=(2, 3))
+    kept: FloatArray = (persistence**apart).mean(axis=(2, 3))
+    return kept
 
 
 class _Quadratic(NamedTuple):

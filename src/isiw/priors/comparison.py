@@ -71,7 +71,8 @@ def _drawn(lab: LabPrior) -> list[dict[str, FloatArray]]:
 
 def _range(values: FloatArray, *, log: bool) -> list[float]:
     quantiles = np.quantile(values, [0.5, 0.05, 0.95])
-    return (np.exp(quantiles) if log else quantiles).tolist()
+    shown: list[float] = (np.exp(quantiles) if log else quantiles).tolist()
+    return shown
 
 
 def _density(name: str, usual: dict[str, FloatArray], own: dict[str, FloatArray]) -> pd.DataFrame:

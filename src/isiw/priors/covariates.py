@@ -107,7 +107,8 @@ def _log_likelihoods(block: LatentBlock, row: int, law: Law, shift: FloatArray, 
     log_law = -0.5 * (about**2 + z[:, 1:] ** 2) - np.log(left) - np.log(law.sd).sum() - np.log(2 * np.pi)
     ratio = log_law - block.log_density[row][:, None] + math.log(1 - P_OUTSIDER)
     weight = np.where(block.used[row][:, None], np.logaddexp(math.log(P_OUTSIDER), ratio), 0.0)
-    return np.logaddexp.reduce(weight, axis=0)
+    found: FloatArray = np.logaddexp.reduce(weight, axis=0)
+    return found
 
 
 def expected(place: Place, slopes: Sequence[Slope], visit: Visit) -> Place:

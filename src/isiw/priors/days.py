@@ -284,7 +284,8 @@ def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
 def _shares(kinds: IntArray, of: int) -> list[float]:
     """Shares of the kinds, counting one more particle that is of all kinds."""
     counts = np.bincount(kinds.ravel(), minlength=of) + 1.0 / of
-    return (counts / counts.sum()).tolist()
+    shares: list[float] = (counts / counts.sum()).tolist()
+    return shares
 
 
 def _laws(

@@ -179,7 +179,8 @@ def _log_ratio(block: LatentBlock, law: _Normal) -> FloatArray:
     mean, sd = law
     z = (block.values - mean) / sd
     log_law = -0.5 * (z**2).sum(-1) - np.log(sd).sum() - 0.5 * np.log(2 * np.pi) * len(mean)
-    return log_law - block.log_density + np.log(1 - P_OUTSIDER)
+    ratio: FloatArray = log_law - block.log_density + np.log(1 - P_OUTSIDER)
+    return ratio
 
 
 def _picked(
@@ -198,7 +199,8 @@ def _picked(
     for name, kinds in people.kinds.items():
         log_share = np.append(np.log(shares[name] / usual[name]), 0.0)
         log_weight = log_weight + log_share[kinds]
-    return (log_weight + rng.gumbel(size=np.shape(log_weight))).argmax(-1)
+    picks: IntArray = (log_weight + rng.gumbel(size=np.shape(log_weight))).argmax(-1)
+    return picks
 
 
 def _members(block: LatentBlock, law: _Normal, picks: IntArray, rng: np.random.Generator) -> FloatArray:
@@ -206,7 +208,8 @@ def _members(block: LatentBlock, law: _Normal, picks: IntArray, rng: np.random.G
     rows = np.arange(len(picks))
     log_odds = _log_ratio(block, law)[rows, picks] - np.log(P_OUTSIDER)
     inside = block.used[rows, picks] & (rng.logistic(size=len(picks)) < log_odds)
-    return block.values[rows, picks][inside]
+    members: FloatArray = block.values[rows, picks][inside]
+    return members
 
 
 def _drawn_law(members: FloatArray, law: _Normal, hyper: HyperPrior, rng: np.random.Generator) -> _Normal:
@@ -262,7 +265,8 @@ def _person(posterior: ParticlePosterior) -> tuple[dict[str, LatentBlock], dict[
 def drawn_from(prior: Prior, space: DesignSpace, size: int) -> FloatArray:
     """Latents of so many people in general, shape (size, d)."""
     values, _ = law_of(prior, space).draws(size, np.zeros(1, dtype=np.uint64))
-    return values[0].astype(float)
+    drawn: FloatArray = values[0].astype(float)
+    return drawn
 
 
 def hyper_prior(prior: Prior, space: DesignSpace) -> dict[str, HyperPrior]:

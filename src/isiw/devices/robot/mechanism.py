@@ -206,7 +206,8 @@ def _speed(descent_ms: ArrayLike, time_ms: ArrayLike, kinetic_share: float) -> F
     """Speed of the hammer [m/s]: the drive integrated from the start of the descent."""
     start, now = (np.asarray(time, dtype=np.float64) - LINE_DELAY_MS for time in (descent_ms, time_ms))
     decay = FILL_MS * (np.exp(-now / FILL_MS) - np.exp(-start / FILL_MS))
-    return DRIVE_M_S2 * ((1 - kinetic_share) * (now - start) + decay) / 1000
+    speed: FloatArray = DRIVE_M_S2 * ((1 - kinetic_share) * (now - start) + decay) / 1000
+    return speed
 
 
 def _travel(descent_ms: ArrayLike, time_ms: ArrayLike, kinetic_share: float) -> FloatArray:
@@ -215,7 +216,8 @@ def _travel(descent_ms: ArrayLike, time_ms: ArrayLike, kinetic_share: float) -> 
     gone = now - start
     initial = np.exp(-start / FILL_MS)
     decay = FILL_MS * (FILL_MS * (initial - np.exp(-now / FILL_MS)) - initial * gone)
-    return DRIVE_M_S2 * ((1 - kinetic_share) * gone**2 / 2 + decay) / 1000
+    travel: FloatArray = DRIVE_M_S2 * ((1 - kinetic_share) * gone**2 / 2 + decay) / 1000
+    return travel
 
 
 def _arrival(descent_ms: FloatArray, travel_mm: FloatArray, kinetic_share: float, first_ms: float) -> FloatArray:

@@ -172,7 +172,8 @@ def mep_shape(since_pulse_ms: ArrayLike) -> FloatArray:
 
 def _turns(time_ms: FloatArray) -> FloatArray:
     waves = [height * np.exp(-0.5 * ((time_ms - centre) / sd) ** 2) for height, centre, sd in MEP_TURNS]
-    return np.sum(waves, axis=0)
+    total: FloatArray = np.sum(waves, axis=0)
+    return total
 
 
 _PEAK_TO_PEAK = float(np.ptp(_turns(np.linspace(0, 100, 10001))))

@@ -111,7 +111,8 @@ def _profiles(found: Fit, picks: Tensor, isi_ms: Tensor, z: Tensor) -> Tensor:
     surplus[-1] -= deviates
     variance = found.processes.amplitude[which].square()
     factor = torch.linalg.cholesky(covariance + torch.diag_embed(torch.outer(variance, surplus)))
-    return mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
+    drawn: Tensor = mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
+    return drawn
 
 
 def _constants(found: Fit, noise: Tensor, z: Tensor) -> Tensor:

@@ -24,7 +24,8 @@ class RisenMean(gpytorch.means.Mean):  # type: ignore[misc] # GPyTorch states no
 
     def forward(self, x: Tensor) -> Tensor:
         """The mean at inputs [ms] of shape (..., n, 1)."""
-        return self.constant(x) + self.places.rise.unsqueeze(-1) * _share(self.places, x)
+        mean: Tensor = self.constant(x) + self.places.rise.unsqueeze(-1) * _share(self.places, x)
+        return mean
 
 
 class WithinWindow(gpytorch.kernels.Kernel):  # type: ignore[misc] # GPyTorch states no types
@@ -39,6 +40,7 @@ class WithinWindow(gpytorch.kernels.Kernel):  # type: ignore[misc] # GPyTorch st
         one, other = _share(self.places, x1), _share(self.places, x2)
         rise = self.places.rise_sd.square().unsqueeze(-1)
         if diag:
-            return (self.base(x1, x2, diag=True, **params) + rise) * one * other
+            own: Tensor = (self.base(x1, x2, diag=True, **params) + rise) * one * other
+            return own
         shared: Tensor = self.base(x1, x2, **params).to_dense() + rise.unsqueeze(-1)
         return shared * one.unsqueeze(-1) * other.unsqueeze(-2)

@@ -64,7 +64,8 @@ class HyperparameterPrior(Checked):
     def z(self, hyperparameters: Hyperparameters) -> Tensor:
         """Distance of hyperparameters from their medians in prior SDs, shape (q, 3)."""
         medians, sds = self._medians_and_sds
-        return (torch.stack(hyperparameters, dim=-1) / medians).log() / sds
+        z: Tensor = (torch.stack(hyperparameters, dim=-1) / medians).log() / sds
+        return z
 
     def grid(self) -> tuple[Hyperparameters, Tensor]:
         """Processes on a grid of equal steps in prior SDs, then those without an amplitude; and their log prior."""

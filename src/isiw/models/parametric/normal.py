@@ -20,7 +20,8 @@ def log_between(low: Tensor, high: Tensor) -> Tensor:
     right = low > 0  # by symmetry, what is above the middle is looked at from below
     first, last = torch.where(right, -high, low), torch.where(right, -low, high)
     below_first, below_last = torch.special.log_ndtr(first), torch.special.log_ndtr(last)
-    return below_last + _log_complement(below_first - below_last)
+    between: Tensor = below_last + _log_complement(below_first - below_last)
+    return between
 
 
 def _log_complement(log_share: Tensor) -> Tensor:

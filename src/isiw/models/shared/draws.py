@@ -48,4 +48,5 @@ def systematic(log_weights: Array, size: int) -> IntArray:
     cumulative = weights.cumsum(-1)
     points = (np.arange(size) + 0.5) / size
     picks = [own.searchsorted(own[-1] * points) for own in cumulative]
-    return np.minimum(np.stack(picks), log_weights.shape[-1] - 1)
+    within: IntArray = np.minimum(np.stack(picks), log_weights.shape[-1] - 1)
+    return within

@@ -54,7 +54,8 @@ class Span(Checked):
     def density(self, start_ms: Array) -> FloatArray:
         """Density at some starts [1/ms], same shape."""
         low, high = (normal_below((start_ms - edge) / self.sd_ms) for edge in (self.low_ms, self.high_ms))
-        return (low - high) / (self.high_ms - self.low_ms)
+        density: FloatArray = (low - high) / (self.high_ms - self.low_ms)
+        return density
 
     def later(self, mean_ms: float, sd_ms: float, share: float = 1.0) -> Span:
         """The same counted from an earlier event."""
@@ -111,7 +112,8 @@ class StartPrior(Checked):
     def usual(self, start_ms: Array, space: DesignSpace) -> FloatArray:
         """Probability that some starts are of the usual span, whatever the rig, same shape."""
         knots = self.knots(space)
-        return np.interp(start_ms, knots.start_ms, knots.usual, left=0.0, right=0.0)
+        share: FloatArray = np.interp(start_ms, knots.start_ms, knots.usual, left=0.0, right=0.0)
+        return share
 
     def as_usual(self, kept: float) -> StartPrior:
         """The same with less probability of all but the usual span."""

@@ -184,7 +184,8 @@ def orifice_flow(conductance: ArrayLike, critical_ratio: ArrayLike, from_pa: Arr
     high, low = np.maximum(one, other), np.minimum(one, other)
     ratio = np.asarray(critical_ratio, dtype=np.float64)
     excess = np.maximum((low / high - ratio) / (1 - ratio), 0.0)
-    return LITRE_PER_S_BAR * np.asarray(conductance) * np.sign(one - other) * high * np.sqrt(1 - excess**2)
+    flow: FloatArray = LITRE_PER_S_BAR * np.asarray(conductance) * np.sign(one - other) * high * np.sqrt(1 - excess**2)
+    return flow
 
 
 def rotate(
@@ -315,7 +316,8 @@ def _fitting_flow(parts: _Parts, state: _Motion, step_s: float) -> FloatArray:
     flow = orifice_flow(parts.fitting, parts.critical_ratio, line_pa, chamber_pa)
     difference = line_pa - chamber_pa
     conductance = np.divide(flow, difference, out=np.zeros_like(flow), where=difference != 0)
-    return flow / (1 + step_s * conductance * (1 / parts.line_m3 + 1 / state.chamber_m3))
+    implicit: FloatArray = flow / (1 + step_s * conductance * (1 / parts.line_m3 + 1 / state.chamber_m3))
+    return implicit
 
 
 def _turned(parts: _Parts, state: _Motion, moment_nm: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
