@@ -101,7 +101,7 @@ def test_heights_in_logs_are_learnt_kept_in_the_file_and_used_for_who_states_one
     shown = CliRunner().invoke(app, ["prior", "show", str(path)])
     assert "Windows start +0.9 ± 0.3 ms for each 1 more of height_cm (people learnt from: 175 ± 10)." in shown.output
     config = RunConfig(prior=path, visit={"height_cm": 185.0}, space={"reference": "valve"})  # type: ignore[arg-type]
-    settings = settings_with_prior(config, DeviceInfo("bench", "valve"))
+    settings = settings_with_prior(config, DeviceInfo("bench", "valve"), [])
     assert settings["prior"].profile.places[0].start_ms == tall.start_ms
 
 

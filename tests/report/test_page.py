@@ -13,7 +13,7 @@ import pytest
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.record import SessionRecord, read_session
 from isiw.report.page import report_page, save_report
-from isiw.report.words import finding_sentences
+from isiw.report.words import findings
 from isiw.session.afterwards import exclude
 from isiw.summary import JUDGED_SINCE
 from isiw.trials import Trial
@@ -45,8 +45,8 @@ def data_of(page: Page) -> Any:
 
 def test_the_page_begins_with_what_was_found_and_answers_the_first_questions(page: Page, record: SessionRecord) -> None:
     assert page.of("h1") == [f"Session of {HOSTILE}"]
-    for sentence in finding_sentences(record):
-        assert sentence in page.words
+    for found in findings(record):
+        assert found.text in page.words
     assert page.of("dt") == [
         "Which trials were lost, and why?", "Was the timing right?", "Was the muscle at rest?", "Why did it stop?",
     ]  # fmt: skip
@@ -167,7 +167,7 @@ def test_a_verdict_after_the_last_estimate_is_said(tmp_path: Path) -> None:
 def test_logs_of_every_kind_have_a_page(name: str) -> None:
     record = read_session(LOGS / name)
     page = Page(report_page(record))
-    assert finding_sentences(record)[0] in page.words
+    assert findings(record)[0].text in page.words
     assert len(data_of(page)["trials"]) == len(record.table)
 
 

@@ -15,11 +15,12 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
-from isiw.findings import NO_MEP, is_silent
 from isiw.metrics import f1
 from isiw.plots.comparison import replay_figure
 from isiw.plots.style import save_figure
+from isiw.signals.plausible import is_silent
 from isiw.strategy.catalogue import make_strategy
+from isiw.summary import NO_MEP
 from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window

@@ -146,7 +146,8 @@ class SessionAnswer(OkAnswer):
     @classmethod
     def of(cls, trials: TrialTable, asked: Stimulus | None, **stands: Any) -> Self:
         """The answer about a session with these trials, one of which may be open."""
-        opened = {f"open_{name}": getattr(asked, name, None) for name in ("trial", "isi_ms", "intensity_pct_rmt")}
+        names = ("trial", "isi_ms", "intensity_pct_rmt")
+        opened: dict[str, Any] = {f"open_{name}": getattr(asked, name, None) for name in names}
         return cls(trials=len(trials), told=len(trials.told), **opened, **stands)
 
 

@@ -221,7 +221,7 @@ _GROUPS: Final = {
 """What an answer may say besides its sequence number."""
 
 
-def _command(what: str, value: Any) -> LineExchange:
+def _command(what: str, value: LineExchange | Mapping[str, Any]) -> LineExchange:
     """A command of the table, which holds nothing, and whose answer says nothing, that has no meaning there."""
     name = what.rpartition(".")[2]
     exchange = from_table(LineExchange, value, f"commands.{name}")
@@ -260,7 +260,7 @@ class LineHeartbeat(Checked):
         LineExchange(self.send.replace("{sequence}", "1"), "")
 
 
-def _heartbeat(what: str, value: Any) -> LineHeartbeat:
+def _heartbeat(what: str, value: LineHeartbeat | Mapping[str, Any]) -> LineHeartbeat:
     return from_table(LineHeartbeat, value, what)
 
 
