@@ -186,7 +186,7 @@ class Law:
         if usual.latents != self.latents or (usual._last != self._last).any():
             raise ValueError("the other prior is of other latents or kinds")
         arrays = self._values(crowd.values, crowd.kinds)
-        known = address(crowd.densities, SINGLE, people, particles, self.blocks)
+        known = address(crowd.densities, SINGLE, people, particles, self.blocks + 1)
         weights = address(crowd.log_weights, DOUBLE, people, particles), address(found, DOUBLE, people, particles)
         call("usual_weights", self._at, usual._at, people, particles, *arrays, known, *weights)
         return found
@@ -222,7 +222,7 @@ class Law:
             *self._values(crowd.values, crowd.kinds),
             address(crowd.log_weights, DOUBLE, people, particles),
             address(crowd.log_likelihood, SINGLE, people, particles),
-            address(crowd.densities, SINGLE, people, particles, self.blocks),
+            address(crowd.densities, SINGLE, people, particles, self.blocks + 1),
             address(found, DOUBLE, people, 6),
         )
         return found
@@ -245,7 +245,7 @@ class Law:
 
     def nothing_known(self, people: int, particles: int) -> Singles:
         """Log densities of blocks of which none was worked out yet, (b, p, blocks)."""
-        return np.full((people, particles, self.blocks), UNKNOWN)
+        return np.full((people, particles, self.blocks + 1), UNKNOWN)
 
     def draws(self, particles: int, seeds: Seeds) -> tuple[Singles, IntArray]:
         """So many particles of the prior of each person: latents (b, p, d), and kinds (b, p, k).
@@ -295,7 +295,7 @@ class Law:
             address(dice, NATURAL, people),
             *self._values(values, kinds),
             address(log_likelihood, SINGLE, people, particles),
-            address(densities, SINGLE, people, particles, self.blocks),
+            address(densities, SINGLE, people, particles, self.blocks + 1),
             address(counts, SINGLE, people, 4),
         )
         return counts

@@ -73,7 +73,7 @@ static void favour_rare(const Crowd *crowd, int64_t particles, double *log_favou
 }
 
 static void resample(const Tables *tables, Crowd *crowd, int64_t particles, const Room *room, uint64_t *dice) {
-    size_t latents = (size_t)tables->latents, blocks = (size_t)tables->blocks, count = (size_t)particles;
+    size_t latents = (size_t)tables->latents, blocks = (size_t)kept_of(tables), count = (size_t)particles;
     const Crowd *fresh = &room->fresh;
     int64_t *picks = room->picks;
     favour_rare(crowd, particles, room->log_favour);
@@ -108,6 +108,7 @@ static double weigh(const Tables *tables, Crowd *crowd, int64_t particles, const
     for (int64_t i = 0; i < particles; i++) {
         float gain = shares ? room->likelihood[i] - crowd->log_likelihood[i] : room->likelihood[i];
         crowd->log_weights[i] += gain, crowd->log_likelihood[i] += gain;
+        if (is_of_part(count - 1)) crowd->densities[i * kept_of(tables) + tables->blocks] += gain; /* UNKNOWN stays so */
     }
     return normalise(crowd->log_weights, particles);
 }
@@ -118,7 +119,7 @@ static int learn(const Tables *tables, int64_t people, int64_t particles, int64_
                  double min_ess, int64_t kept, int64_t resampled, uint64_t *dice, float *values, int64_t *kinds,
                  double *log_weights, float *log_likelihood, float *densities, double *found) {
     size_t each = (size_t)particles;
-    int64_t latents = tables->latents, blocks = tables->blocks;
+    int64_t latents = tables->latents, blocks = kept_of(tables);
     Room room = {.fields = malloc(each * FIELDS * sizeof(float)),
                  .likelihood = malloc(each * sizeof(float)),
                  .picks = malloc(each * sizeof(int64_t)),
@@ -161,7 +162,7 @@ static int usual_weights(const Tables *tables, const Tables *usual, int64_t peop
         const float *known[LANES];
         for (int64_t lane = 0; lane < LANES; lane++) {
             numbers[lane] = first + lane;
-            known[lane] = densities + (first + (lane < left ? lane : left - 1)) * tables->blocks;
+            known[lane] = densities + (first + (lane < left ? lane : left - 1)) * kept_of(tables);
         }
         Lanes lanes = lanes_of(values, tables->latents, kinds, numbers, left);
         Reals own = log_usual(tables, &lanes, known), others = log_usual(usual, &lanes, NULL);

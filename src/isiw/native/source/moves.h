@@ -2,7 +2,12 @@
 
 Half of the particles move at a time: by differences within the other half, or by a jump that draws some of their kinds
 and latents again. A move is accepted with probability min(1, exp(likelihood ratio + prior ratio + ratio of proposals))
-(Hastings, Biometrika 57, 1970). */
+(Hastings, Biometrika 57, 1970).
+
+Whether it is, is decided in two steps (Christen and Fox, J. Comput. Graph. Stat. 14, 2005): with a(x, y) by a part of
+the trials, then with min(1, r a(y, x) / a(x, y)) by all of them, r being the ratio of a single step. Here a is
+min(1, exp(leeway) times the ratio that the part lets expect), so that a proposal is as likely to be accepted as in a
+single step unless the part is further off than the leeway, and the posterior is the same however far off it is. */
 
 #ifndef ISIW_MOVES_H
 #define ISIW_MOVES_H
@@ -18,7 +23,11 @@ and latents again. A move is accepted with probability min(1, exp(likelihood rat
 #define A_LITTLE 0.3f         /* and at most by what size */
 #define OF_STEPS 0.7f         /* how often a size is proposed near the step of the amplitudes at its trial, */
 #define STEP_SD 0.3f          /* and how near, natural log */
+#define LEEWAY 4.0            /* of the first step of a decision, natural log */
 #define ANOTHER_KIND 0.25f    /* how often a change that moves a little becomes one of another kind */
+
+enum { PART = 3, LEAST_TRIALS = 8 }; /* one trial in so many is of the part; shorter histories are not parted */
+INLINE int is_of_part(int64_t n) { return n % PART == 1; }
 
 /* What the moves of a person have in common. */
 typedef struct {
@@ -27,6 +36,10 @@ typedef struct {
     int64_t count;      /* of trials */
     float *redrawn;     /* room for latents that are drawn again, (latents,) */
     uint64_t *touched;  /* blocks that a part moves, by state, (states, part_count), then those of each jump, as bits */
+    const Trial *trials; /* those of the part first */
+    int64_t part;        /* how many these are; 0 where decisions are of one step */
+    int shares;          /* whether trials share a factor of their known parts */
+    float last;          /* before which of them all are, as their order has it */
 } Chain;
 
 /* The blocks of which any latent is flagged, as bits. */
@@ -187,12 +200,35 @@ static int overlap(const Tables *tables, const float *z) {
     return start + exp_1(z[at[LOG_WIDTH_MS]]) > low && low + exp_1(z[at[LOW_LOG_WIDTH_MS]]) > start;
 }
 
+/* Whether a change bears on the trials so far. */
+static int is_felt(const Chain *chain, const float *z, const int64_t *kinds) {
+    int64_t kind = kinds[OF_CHANGE];
+    float after = exp_1(latent_of(chain->tables, z, LOG_CHANGED_AFTER));
+    return kind == ENHANCEMENT_CHANGE || (kind != NO_CHANGE && after <= 1.0001f * chain->last);
+}
+
+/* Whether a jump is to what all trials so far are as likely under, as far as that is plain. */
+static int is_indifferent(const Chain *chain, int64_t number, const float *z, const int64_t *kinds, const float *old,
+                          const int64_t *old_kinds) {
+    const Tables *tables = chain->tables;
+    if (!tables->of_profile[number])
+        return !chain->touched[tables->states * tables->part_count + number] &&
+               !memcmp(kinds, old_kinds, OF_CHANGE * sizeof *kinds) && !is_felt(chain, z, kinds) &&
+               !is_felt(chain, old, old_kinds);
+    if (!kinds[OF_PRESENT] && !old_kinds[OF_PRESENT]) return 1;
+    return kinds[OF_SHAPE] == GAUSSIAN && old_kinds[OF_SHAPE] == GAUSSIAN && /* which has no form */
+           latent_of(tables, z, START_MS) == latent_of(tables, old, START_MS) &&
+           latent_of(tables, z, LOG_WIDTH_MS) == latent_of(tables, old, LOG_WIDTH_MS);
+}
+
 /* Where the particles of a half may move to. */
 typedef struct {
     float *z;         /* (half, latents) */
     float *found;     /* log densities of blocks that a difference moves, (half, blocks) */
     float *fields;    /* what it means, (half, FIELDS) */
-    float *after;     /* its log likelihood, (half,) */
+    float *part;      /* its log likelihood by a part of the trials, (half,) */
+    float *after;     /* and by all of them */
+    float *log_u;     /* log of the draw that decides, less that of the first step's probability */
     double *ratio;    /* of prior densities and proposals, natural log */
     int64_t *kinds;   /* (half, KINDS) */
     int64_t *numbers; /* room for numbers of some of them, (half,) */
@@ -200,6 +236,7 @@ typedef struct {
     uint64_t *moved;  /* blocks that a difference moves, as bits */
     uint8_t *jumped;  /* whether it is a jump */
     uint8_t *wanted;  /* whether its likelihood must be worked out */
+    uint8_t *unknown; /* whether the particle's own is unknown, by the part */
 } Proposals;
 
 /* Propose a particle in place of one: of another likelihood where it is wanted, of another prior where blocks moved. */
@@ -215,7 +252,7 @@ static void propose(const Chain *chain, const Proposals *to, int64_t i, const fl
     to->ratio[i] = 0.0, to->moved[i] = 0;
     if (to->jumped[i]) {
         int64_t number = jump(chain, dice, z, chosen, to->ratio + i);
-        to->wanted[i] = !(tables->of_profile[number] && !kinds[OF_PRESENT] && !chosen[OF_PRESENT]);
+        to->wanted[i] = !is_indifferent(chain, number, z, chosen, old, kinds);
         return;
     }
     int64_t part = state * tables->part_count + which(uniform(dice), tables->parts, tables->part_count - 1);
@@ -230,7 +267,7 @@ static void densities_of(const Tables *tables, int64_t block, const float *value
         Lanes lanes = lanes_of(values, tables->latents, kinds, numbers + first, count - first);
         Reals of = log_block_of(tables, block, &lanes);
         for (int lane = 0; lane < LANES && first + lane < count; lane++)
-            found[numbers[first + lane] * tables->blocks + block] = of[lane];
+            found[numbers[first + lane] * kept_of(tables) + block] = of[lane];
     }
 }
 
@@ -241,13 +278,13 @@ static void weigh_shifts(const Tables *tables, const Proposals *to, int64_t size
     for (int64_t block = 0; block < tables->blocks; block++) {
         int64_t count = 0, unknown = 0;
         for (int64_t i = 0; i < size; i++)
-            if (to->moved[i] >> block & 1 && densities[i * tables->blocks + block] == UNKNOWN) numbers[unknown++] = i;
+            if (to->moved[i] >> block & 1 && densities[i * kept_of(tables) + block] == UNKNOWN) numbers[unknown++] = i;
         densities_of(tables, block, old, kinds, numbers, unknown, densities);
         for (int64_t i = 0; i < size; i++)
             if (to->moved[i] >> block & 1) numbers[count++] = i;
         densities_of(tables, block, to->z, to->kinds, numbers, count, to->found);
         for (int64_t n = 0; n < count; n++) {
-            int64_t at = numbers[n] * tables->blocks + block;
+            int64_t at = numbers[n] * kept_of(tables) + block;
             to->ratio[numbers[n]] += (double)to->found[at] - densities[at];
         }
     }
@@ -259,12 +296,19 @@ typedef struct {
     int64_t *kinds;
 } State;
 
+/* Work out what those mean whose likelihood is wanted. */
+static void meanings_wanted(const Tables *tables, const Proposals *to, int64_t size) {
+    int64_t wanted = 0;
+    for (int64_t i = 0; i < size; i++)
+        if (to->wanted[i]) to->numbers[wanted++] = i;
+    meanings_of(tables, to->z, tables->latents, to->kinds, to->numbers, wanted, to->fields);
+}
+
 static void accept(const Tables *tables, const Proposals *to, int64_t i, State *state, int64_t particle) {
-    float *log_likelihood = state->log_likelihood + particle, *densities = state->densities + particle * tables->blocks;
+    float *log_likelihood = state->log_likelihood + particle, *densities = state->densities + particle * kept_of(tables);
     int sort = to->jumped[i] ? 2 : 0;
     state->counts[sort] += 1.0f;
-    double ratio = (double)to->after[i] - *log_likelihood + to->ratio[i];
-    if (!(log_1(most_1(uniform(to->dice + i), 1e-30f)) < ratio)) return;
+    if (!(to->log_u[i] < (double)to->after[i] - *log_likelihood + to->ratio[i])) return;
     state->counts[sort + 1] += 1.0f;
     *log_likelihood = to->after[i];
     memcpy(state->values + particle * tables->latents, to->z + i * tables->latents,
@@ -273,72 +317,122 @@ static void accept(const Tables *tables, const Proposals *to, int64_t i, State *
     for (int64_t block = 0; to->jumped[i] && block < tables->blocks; block++) densities[block] = UNKNOWN;
     for (uint64_t moved = to->moved[i]; moved;) {
         int64_t block = next_of(&moved);
-        densities[block] = to->found[i * tables->blocks + block];
+        densities[block] = to->found[i * kept_of(tables) + block];
+    }
+    densities[tables->blocks] = to->part[i];
+}
+
+/* Reject what a part of the trials is enough to reject, see above. */
+static void screen(const Chain *chain, const Proposals *to, int64_t size, const float *old, const int64_t *kinds,
+                   float *densities) {
+    const Tables *tables = chain->tables;
+    int64_t unknown = 0;
+    for (int64_t i = 0; i < size; i++) {
+        to->unknown[i] = to->wanted[i] && densities[i * kept_of(tables) + tables->blocks] == UNKNOWN;
+        if (to->unknown[i]) to->numbers[unknown++] = i;
+    }
+    meanings_of(tables, old, tables->latents, kinds, to->numbers, unknown, to->fields);
+    person_likelihood(to->fields, size, to->unknown, chain->trials, chain->part, 0, to->part);
+    for (int64_t n = 0; n < unknown; n++)
+        densities[to->numbers[n] * kept_of(tables) + tables->blocks] = to->part[to->numbers[n]];
+    meanings_wanted(tables, to, size);
+    person_likelihood(to->fields, size, to->wanted, chain->trials, chain->part, 0, to->part);
+    float trials = (float)chain->count / (float)chain->part;
+    for (int64_t i = 0; i < size; i++) {
+        if (!to->wanted[i]) continue;
+        float own = densities[i * kept_of(tables) + tables->blocks];
+        double expected = to->ratio[i] + trials * (to->part[i] - own), there = fmin(0.0, LEEWAY + expected);
+        to->log_u[i] -= (float)there, to->ratio[i] += fmin(0.0, LEEWAY - expected) - there;
+        to->wanted[i] = to->log_u[i] < 0.0f;
+        if (!to->wanted[i]) to->ratio[i] = -INFINITY;
     }
 }
 
 /* Move the particles first to behind by differences within those from theirs on. */
-static void move_half(const Chain *chain, const Proposals *to, const Trial *trials, int shares, State *state,
-                      uint64_t sweep, int64_t first, int64_t behind, int64_t theirs, int64_t others) {
+static void move_half(const Chain *chain, const Proposals *to, State *state, uint64_t sweep, int64_t first,
+                      int64_t behind, int64_t theirs, int64_t others) {
     const Tables *tables = chain->tables;
-    int64_t latents = tables->latents, size = behind - first, wanted = 0;
+    int64_t latents = tables->latents, size = behind - first;
     const float *old = state->values + first * latents;
     const int64_t *kinds = state->kinds + first * KINDS;
+    float *densities = state->densities + first * kept_of(tables);
     for (int64_t i = 0; i < size; i++) {
         to->dice[i] = stream_of(sweep, first + i);
         propose(chain, to, i, old + i * latents, kinds + i * KINDS, state->values + theirs * latents, others);
+        to->log_u[i] = log_1(most_1(uniform(to->dice + i), 1e-30f));
     }
-    weigh_shifts(tables, to, size, old, kinds, state->densities + first * tables->blocks);
+    weigh_shifts(tables, to, size, old, kinds, densities);
     for (int64_t i = 0; i < size; i++) {
         if (tables->apart && overlap(tables, to->z + i * latents)) to->ratio[i] = -INFINITY;
-        to->after[i] = state->log_likelihood[first + i];
+        to->after[i] = state->log_likelihood[first + i], to->part[i] = densities[i * kept_of(tables) + tables->blocks];
         to->wanted[i] &= to->ratio[i] > -INFINITY;
-        if (to->wanted[i]) to->numbers[wanted++] = i;
     }
-    meanings_of(tables, to->z, latents, to->kinds, to->numbers, wanted, to->fields);
-    person_likelihood(to->fields, size, to->wanted, trials, chain->count, shares, to->after);
-    for (int64_t i = 0; i < size; i++) accept(tables, to, i, state, first + i);
+    if (chain->part)
+        screen(chain, to, size, old, kinds, densities);
+    else
+        meanings_wanted(tables, to, size);
+    person_likelihood(to->fields, size, to->wanted, chain->trials + chain->part, chain->count - chain->part,
+                      chain->shares, to->after);
+    for (int64_t i = 0; i < size; i++) {
+        if (to->wanted[i]) chain->part ? (to->after[i] += to->part[i]) : (to->part[i] = UNKNOWN);
+        accept(tables, to, i, state, first + i);
+    }
+}
+
+/* The trials of the part, then the others; how many are of the part. */
+static int64_t parted(const Trial *trials, int64_t count, int shares, Trial *ordered) {
+    int64_t part = 0, rest = 0;
+    for (int64_t n = 0; n < count; n++) part += is_of_part(n);
+    if (shares || count < LEAST_TRIALS) part = 0;
+    for (int64_t n = 0, first = 0; n < count; n++)
+        ordered[part && is_of_part(n) ? first++ : part + rest++] = trials[n];
+    return part;
 }
 
 static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64_t count, const int64_t *numbers,
                   const float *columns, uint64_t *dice, float *values, int64_t *kinds, float *log_likelihood,
                   float *densities, float *counts) {
-    int64_t half = particles / 2, most = particles - half, latents = tables->latents, blocks = tables->blocks;
+    int64_t half = particles / 2, most = particles - half, latents = tables->latents, kept = kept_of(tables);
     size_t each = (size_t)most;
-    Trial *trials = malloc((size_t)(count + 1) * sizeof *trials);
+    Trial *trials = malloc((size_t)(count + 1) * 2 * sizeof *trials), *ordered = trials + count;
     float *steps = malloc((size_t)(count + 1) * sizeof *steps);
     Proposals to = {.z = malloc(each * (size_t)latents * sizeof(float)),
-                    .found = malloc(each * (size_t)blocks * sizeof(float)),
+                    .found = malloc(each * (size_t)kept * sizeof(float)),
                     .fields = malloc(each * FIELDS * sizeof(float)),
+                    .part = malloc(each * sizeof(float)),
                     .after = malloc(each * sizeof(float)),
+                    .log_u = malloc(each * sizeof(float)),
                     .ratio = malloc(each * sizeof(double)),
                     .kinds = malloc(each * KINDS * sizeof(int64_t)),
                     .numbers = malloc(each * sizeof(int64_t)),
                     .dice = malloc(each * sizeof(uint64_t)),
                     .moved = malloc(each * sizeof(uint64_t)),
                     .jumped = malloc(each),
-                    .wanted = malloc(each)};
+                    .wanted = malloc(each),
+                    .unknown = malloc(each)};
     float *redrawn = malloc((size_t)latents * sizeof *redrawn);
     uint64_t *touched = malloc((size_t)(tables->states * tables->part_count + tables->jump_count) * sizeof *touched);
     int there = trials && steps && to.z && to.found && to.fields && to.after && to.ratio && to.kinds && to.numbers &&
-                to.dice && to.moved && to.jumped && to.wanted && redrawn && touched;
+                to.dice && to.moved && to.jumped && to.wanted && to.unknown && to.part && to.log_u && redrawn && touched;
     if (there) touched_of(tables, touched);
     for (int64_t person = 0; there && person < people; person++) {
         int shares = trials_of(columns + person * count * COLUMNS, count, trials);
-        Chain chain = {tables, steps, count, redrawn, touched};
+        int64_t part = parted(trials, count, shares, ordered);
+        Chain chain = {tables, steps, count, redrawn, touched, ordered, part, shares, 0.0f};
+        for (int64_t n = 0; n < count; n++) chain.last = most_1(chain.last, trials[n].of[ORDER]);
         steps_of(columns + person * count * COLUMNS, count, steps);
         int64_t at = person * particles;
-        State state = {values + at * latents, log_likelihood + at, densities + at * blocks, counts + 4 * person,
+        State state = {values + at * latents, log_likelihood + at, densities + at * kept, counts + 4 * person,
                        kinds + at * KINDS};
         for (int64_t sweep = 0; sweep < numbers[person]; sweep++) {
             uint64_t stream = random_bits(dice + person);
-            move_half(&chain, &to, trials, shares, &state, stream, 0, half, half, most);
-            move_half(&chain, &to, trials, shares, &state, stream, half, particles, 0, half);
+            move_half(&chain, &to, &state, stream, 0, half, half, most);
+            move_half(&chain, &to, &state, stream, half, particles, 0, half);
         }
     }
     free(trials), free(steps), free(redrawn), free(touched), free(to.z), free(to.found), free(to.fields);
     free(to.after), free(to.ratio), free(to.kinds), free(to.numbers), free(to.dice), free(to.moved), free(to.jumped);
-    free(to.wanted);
+    free(to.wanted), free(to.unknown), free(to.part), free(to.log_u);
     return there ? 0 : -1;
 }
 

@@ -44,6 +44,10 @@ enum { MOST_OF_BLOCK = 32, MOST_BLOCKS = 64 }; /* how many latents a block has, 
 #define INTENSITY_PCT 9.0f  /* by how much the intensity changes at a size of 1 [% RMT] */
 #define FADING_HALVES 0.04f /* by how many halves the enhancement changes from trial to trial at a size of 1 */
 
+/* How many numbers are kept with a particle: the log densities of its blocks, and its log likelihood by a part of the
+trials, which moves screen proposals by. */
+INLINE int64_t kept_of(const Tables *tables) { return tables->blocks + 1; }
+
 /* Latents of particles side by side: where those of each lane begin, and its kinds. */
 typedef struct {
     const float *z[LANES];
