@@ -192,7 +192,7 @@ class Law:
         return found
 
     def learn(self, columns: Singles, min_ess: float, sweeps: tuple[int, int], dice: Seeds, crowd: Crowd) -> FloatArray:
-        """Let particles learn the last of the trials, in place; what was found on the way, (b, 6).
+        """Let particles learn the last of the trials, in place; what was found on the way, (b, 9).
 
         Args:
             columns: the trials, (b, n, columns).
@@ -203,10 +203,11 @@ class Law:
 
         Returns:
             Log likelihood of the trial, effective sample size before resampling as a share, shifts, those that were
-            accepted, jumps, and those that were accepted, (b, 6).
+            accepted, jumps, and those that were accepted; the probabilities, before the trial, of amplitudes below its
+            lower and its upper end times the weights of particles that predict it, and these weights, summed, (b, 9).
         """
         people, particles = self._require_particles(crowd.values, crowd.kinds)
-        trials, found = columns.shape[1], np.empty((people, 6), dtype=DOUBLE)
+        trials, found = columns.shape[1], np.empty((people, 9), dtype=DOUBLE)
         if particles < 2 or not trials:
             raise ValueError("particles move by differences of others, and learn from a trial")
         call(
@@ -223,7 +224,7 @@ class Law:
             address(crowd.log_weights, DOUBLE, people, particles),
             address(crowd.log_likelihood, SINGLE, people, particles),
             address(crowd.densities, SINGLE, people, particles, self.blocks + 1),
-            address(found, DOUBLE, people, 6),
+            address(found, DOUBLE, people, 9),
         )
         return found
 
