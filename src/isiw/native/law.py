@@ -149,7 +149,6 @@ class Law:
             **{name: address(self._arrays[name], dtype, *shape) for name, (dtype, shape) in shapes.items()},
         )
         self.latents, self.blocks = latents, blocks
-        self._last = np.minimum(_LAST_KINDS, [3, 4, 1, 1, values]).astype(NATURAL)
         self._require_indices(width, knots=len(knots), changed=tables.changed)
 
     def _require_indices(self, width: int, *, knots: int, changed: int) -> None:
@@ -183,7 +182,7 @@ class Law:
         """Log weights of particles under another prior, which ISIs are chosen with, (b, p)."""
         people, particles = self._require_particles(crowd.values, crowd.kinds)
         found = np.empty((people, particles), dtype=DOUBLE)
-        if usual.latents != self.latents or (usual._last != self._last).any():
+        if usual.latents != self.latents or usual._struct.kind_values != self._struct.kind_values:
             raise ValueError("the other prior is of other latents or kinds")
         arrays = self._values(crowd.values, crowd.kinds)
         known = address(crowd.densities, SINGLE, people, particles, self.blocks + 1)
@@ -303,7 +302,6 @@ class Law:
 
     def _require_particles(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
         people, particles, latents = values.shape
-        within = latents == self.latents and kinds.shape == (people, particles, KINDS)
-        if not within or (kinds.view(NATURAL) > self._last).any():  # without a sign, what is below 0 is too large
+        if latents != self.latents or kinds.shape != (people, particles, KINDS):
             raise ValueError("these are no particles of this prior")
         return people, particles

@@ -134,8 +134,12 @@ def call(name: str, *arguments: object) -> None:
 
     Raises:
         MemoryError: there is not enough for what it needs in between.
+        ValueError: kinds of particles are none that there are.
     """
-    if _functions(name)(*arguments):
+    failed = _functions(name)(*arguments)
+    if failed > 0:
+        raise ValueError("these are no particles of this prior")
+    if failed:
         raise MemoryError(f"there is no memory for {name}")
 
 

@@ -1,12 +1,15 @@
 /* What Python calls: the law of particles over arrays. Sizes come with the arrays, and Python checks them before.
 
 Every function writes into the arrays that it is given, and returns 0, or -1 where there is no memory for what it needs
-in between. Single precision; indices are 64 bits. Arrays lie in C order: (b, p, d) are people, particles, latents. */
+in between, or NO_PARTICLES where kinds of particles are none that there are. Single precision; indices are 64 bits.
+Arrays lie in C order: (b, p, d) are people, particles, latents. */
 
 #ifndef ISIW_ENGINE_H
 #define ISIW_ENGINE_H
 
 #include <stdint.h>
+
+enum { NO_PARTICLES = 1 };
 
 /* What is known of a model's prior and of its moves; see `isiw.native.law.Tables`. */
 typedef struct {

@@ -141,6 +141,7 @@ enum { OF_A_TRIAL = 9 }; /* numbers that are found, see engine.h */
 static int learn(const Tables *tables, int64_t people, int64_t particles, int64_t count, const float *columns,
                  double min_ess, int64_t kept, int64_t resampled, uint64_t *dice, float *values, int64_t *kinds,
                  double *log_weights, float *log_likelihood, float *densities, double *found) {
+    if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
     size_t each = (size_t)particles;
     int64_t latents = tables->latents, blocks = kept_of(tables);
     Room room = {.fields = malloc(each * FIELDS * sizeof(float)),
@@ -181,6 +182,7 @@ static int learn(const Tables *tables, int64_t people, int64_t particles, int64_
 static int usual_weights(const Tables *tables, const Tables *usual, int64_t people, int64_t particles,
                          const float *values, const int64_t *kinds, const float *densities, const double *log_weights,
                          double *found) {
+    if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
     for (int64_t first = 0, count = people * particles; first < count; first += LANES) {
         int64_t numbers[LANES], left = count - first;
         const float *known[LANES];
@@ -200,6 +202,7 @@ static int usual_weights(const Tables *tables, const Tables *usual, int64_t peop
 static int represent(const Tables *tables, int64_t people, int64_t particles, int64_t size, int64_t trials,
                      const float *values, const int64_t *kinds, const double *log_weights, int64_t *picks,
                      float *fields) {
+    if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
     float *room = malloc((size_t)particles * FIELDS * sizeof *room);
     if (!room) return -1;
     for (int64_t person = 0; person < people; person++) {

@@ -392,6 +392,7 @@ static int64_t parted(const Trial *trials, int64_t count, int shares, Trial *ord
 static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64_t count, const int64_t *numbers,
                   const float *columns, uint64_t *dice, float *values, int64_t *kinds, float *log_likelihood,
                   float *densities, float *counts) {
+    if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
     int64_t half = particles / 2, most = particles - half, latents = tables->latents, kept = kept_of(tables);
     size_t each = (size_t)most;
     Trial *trials = malloc((size_t)(count + 1) * 2 * sizeof *trials), *ordered = trials + count;
