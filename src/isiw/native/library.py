@@ -18,7 +18,7 @@ from isiw.native.sources import digest
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
 
-VERSION: Final = 6
+VERSION: Final = 7
 """Of the engine: it grows if the same draws come to other numbers."""
 
 _LONGEST: Final = 200
