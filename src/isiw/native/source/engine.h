@@ -55,8 +55,8 @@ typedef struct {
                          double *found);
     /* Particles after one more trial, the last of the columns (b, n, COLUMNS), in place: weighed, resampled where fewer
     carry the posterior than a share, and moved so often where they were kept and where they were resampled. Found are
-    the log likelihood of the trial, the effective sample size as a share, counts of moves as of `sweeps`, and before the
-    trial the probabilities of amplitudes below its two ends times weights, and the weights, summed, (b, 9). */
+    the log likelihood of the trial, the effective sample size as a share, counts of moves as of `sweeps`, and what was
+    foretold: probabilities of amplitudes below its two ends times weights, and the weights, summed, (b, 9). */
     int (*learn)(const Tables *tables, int64_t people, int64_t particles, int64_t trials, const float *columns,
                  double min_ess, int64_t kept, int64_t resampled, uint64_t *dice, float *values, int64_t *kinds,
                  double *log_weights, float *log_likelihood, float *densities, double *found);

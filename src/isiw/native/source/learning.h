@@ -131,7 +131,8 @@ static double weigh(const Tables *tables, Crowd *crowd, int64_t particles, const
     for (int64_t i = 0; i < particles; i++) {
         float gain = shares ? room->likelihood[i] - crowd->log_likelihood[i] : room->likelihood[i];
         crowd->log_weights[i] += gain, crowd->log_likelihood[i] += gain;
-        if (is_of_part(count - 1)) crowd->densities[i * kept_of(tables) + tables->blocks] += gain; /* UNKNOWN stays so */
+        /* what is unknown stays so: it is too large to change */
+        if (is_of_part(count - 1)) crowd->densities[i * kept_of(tables) + tables->blocks] += gain;
     }
     return normalise(crowd->log_weights, particles);
 }
@@ -155,8 +156,8 @@ static int learn(const Tables *tables, int64_t people, int64_t particles, int64_
                            .densities = malloc(each * (size_t)blocks * sizeof(float)),
                            .kinds = malloc(each * KINDS * sizeof(int64_t))}};
     Crowd *fresh = &room.fresh;
-    int failed = !(room.fields && room.likelihood && room.picks && room.log_favour && room.some && room.trials && fresh->values &&
-                   fresh->log_likelihood && fresh->densities && fresh->kinds);
+    int failed = !(room.fields && room.likelihood && room.picks && room.log_favour && room.some && room.trials &&
+                   fresh->values && fresh->log_likelihood && fresh->densities && fresh->kinds);
     for (int64_t person = 0; !failed && person < people; person++) {
         int64_t at = person * particles;
         const float *told = columns + person * count * COLUMNS;
@@ -174,7 +175,8 @@ static int learn(const Tables *tables, int64_t people, int64_t particles, int64_
                             crowd.log_likelihood, crowd.densities, counts);
         for (int i = 0; i < 4; i++) of_person[2 + i] = counts[i];
     }
-    free(room.fields), free(room.likelihood), free(room.picks), free(room.log_favour), free(room.trials), free(room.some);
+    free(room.fields), free(room.likelihood), free(room.picks), free(room.log_favour), free(room.some);
+    free(room.trials);
     free(fresh->values), free(fresh->log_likelihood), free(fresh->densities), free(fresh->kinds);
     return failed ? -1 : 0;
 }
