@@ -28,7 +28,7 @@ from isiw.models.windows import Runs, best_window, grid_of
 from isiw.native.engine import entropy_reductions, log_likelihoods, variance_reductions
 from native.drawn import Case, seeds
 
-TRIALS = (0, 1, 2, 15, 16, 17, 63, 64, 65, 127, 128, 129, 257)
+TRIALS = (0, 1, 2, 7, 8, 9, 15, 16, 17, 63, 64, 65, 127, 128, 129, 257)
 PARTICLES = (2, 3, 15, 16, 17, 65)
 ISIS = (2, 3, 15, 16, 17, 23, 24, 25, 63, 64, 65)
 COMPONENTS = (1, 15, 16, 17, 63, 64, 65, 130)

@@ -22,7 +22,7 @@ from isiw.types import BoolArray, FloatArray, IntArray, Singles
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
 
-VERSION: Final = 6
+VERSION: Final = 7
 """Of the engine: it grows if the same draws come to other numbers."""
 
 _LONGEST: Final = 200
@@ -138,8 +138,12 @@ def call(name: str, *arguments: object) -> None:
 
     Raises:
         MemoryError: there is not enough for what it needs in between.
+        ValueError: kinds of particles are none that there are.
     """
-    if _functions(name)(*arguments):
+    failed = _functions(name)(*arguments)
+    if failed > 0:
+        raise ValueError("these are no particles of this prior")
+    if failed:
         raise MemoryError(f"there is no memory for {name}")
 
 

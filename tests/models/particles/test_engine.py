@@ -30,7 +30,7 @@ from isiw.models.particles.records import (
 )
 from isiw.models.protocol import Observation
 from isiw.models.shared.draws import systematic
-from isiw.models.shared.history import Circumstances, History, neutral
+from isiw.models.shared.history import COUNTS, Circumstances, History, neutral
 from isiw.native.engine import UNKNOWN, elementary, log_likelihoods
 from isiw.types import FloatArray, Singles
 from native import reference
@@ -70,20 +70,23 @@ def test_long_histories_are_summed_piece_by_piece() -> None:
     np.testing.assert_allclose(got, expected, rtol=1e-5)
 
 
-def few_trials() -> History:
-    """Four trials with a window of about 60 to 120 ms."""
-    made = neutral(4)
-    made[:, 0] = 20.0, 80.0, 110.0, 160.0
-    made[:, 2] = made[:, 3] = np.log([0.02, 0.1, 0.05, 0.02])
+def few_trials(times: int) -> History:
+    """Four trials with a window of about 60 to 120 ms, so many times, each of which counts as much less."""
+    made = neutral(4 * times)
+    made[:, 0] = np.tile([20.0, 80.0, 110.0, 160.0], times)
+    made[:, 2] = made[:, 3] = np.tile(np.log([0.02, 0.1, 0.05, 0.02]), times)
+    made[:, 4], made[:, COUNTS] = np.arange(4 * times), 1.0 / times
     return History(made[np.newaxis])
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("times", [1, 4])
 @pytest.mark.parametrize("name", CASES)
-def test_moves_leave_the_posterior_of_weighted_particles_of_the_prior_as_it_is(name: str) -> None:
+def test_moves_leave_the_posterior_of_weighted_particles_of_the_prior_as_it_is(name: str, times: int) -> None:
+    # From eight trials on moves are decided in two steps, the first by a part of the trials.
     # 4,000 particles that stand for 400,000 of the prior, weighted, after 40 sweeps: means differ by less than five
     # standard errors of 200 independent particles, and shares of the kinds by less than .05.
-    case, told = CASES[name], few_trials()
+    case, told = CASES[name], few_trials(times)
     drawn = case.drawn(400_000, 3)
     log_weights = log_likelihoods(case.fields(drawn), told.columns).astype(float)
     weights = scipy.special.softmax(log_weights, axis=-1)[0]

@@ -8,7 +8,7 @@ from isiw.change import Misfit
 from isiw.design import VALVE_SPACE
 from isiw.estimate import WindowEstimate
 from isiw.models.particles import ParticleModel
-from isiw.models.particles.misfit import Bets, probability_below
+from isiw.models.particles.misfit import Bets
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import observed
 from isiw.trials import Trial
@@ -54,9 +54,10 @@ def test_larger_amplitudes_are_less_probably_exceeded() -> None:
     below = []
     for mep_mv in (1e-4, 0.01, 0.05, 10.0):
         trial = observed(Observation.of(np.array([250.0]), np.array([mep_mv])), 0.005, 0.02, 0)
-        low, high = probability_below(trial, posterior.swarm.crowd, posterior.law, np.ones((1, 1000), dtype=bool))[0]
+        crowd, dice = posterior.swarm.crowd.copied(), np.zeros(1, dtype=np.uint64)
+        low, high, weight = posterior.law.learn(trial.columns, 0.0, (0, 0), dice, crowd)[0, 6:]
         assert low == high
-        below.append(high)
+        below.append(high / weight)
     assert below == sorted(below)
     assert below[0] < 0.01
     assert 0.3 < below[1] < below[2]

@@ -149,7 +149,6 @@ class Law:
             **{name: address(self._arrays[name], dtype, *shape) for name, (dtype, shape) in shapes.items()},
         )
         self.latents, self.blocks = latents, blocks
-        self._last = np.minimum(_LAST_KINDS, [3, 4, 1, 1, values]).astype(NATURAL)
         self._require_indices(width, knots=len(knots), changed=tables.changed)
 
     def _require_indices(self, width: int, *, knots: int, changed: int) -> None:
@@ -183,16 +182,16 @@ class Law:
         """Log weights of particles under another prior, which ISIs are chosen with, (b, p)."""
         people, particles = self._require_particles(crowd.values, crowd.kinds)
         found = np.empty((people, particles), dtype=DOUBLE)
-        if usual.latents != self.latents or (usual._last != self._last).any():
+        if usual.latents != self.latents or usual._struct.kind_values != self._struct.kind_values:
             raise ValueError("the other prior is of other latents or kinds")
         arrays = self._values(crowd.values, crowd.kinds)
-        known = address(crowd.densities, SINGLE, people, particles, self.blocks)
+        known = address(crowd.densities, SINGLE, people, particles, self.blocks + 1)
         weights = address(crowd.log_weights, DOUBLE, people, particles), address(found, DOUBLE, people, particles)
         call("usual_weights", self._at, usual._at, people, particles, *arrays, known, *weights)
         return found
 
     def learn(self, columns: Singles, min_ess: float, sweeps: tuple[int, int], dice: Seeds, crowd: Crowd) -> FloatArray:
-        """Let particles learn the last of the trials, in place; what was found on the way, (b, 6).
+        """Let particles learn the last of the trials, in place; what was found on the way, (b, 9).
 
         Args:
             columns: the trials, (b, n, columns).
@@ -203,10 +202,11 @@ class Law:
 
         Returns:
             Log likelihood of the trial, effective sample size before resampling as a share, shifts, those that were
-            accepted, jumps, and those that were accepted, (b, 6).
+            accepted, jumps, and those that were accepted; the probabilities, before the trial, of amplitudes below its
+            lower and its upper end times the weights of particles that predict it, and these weights, summed, (b, 9).
         """
         people, particles = self._require_particles(crowd.values, crowd.kinds)
-        trials, found = columns.shape[1], np.empty((people, 6), dtype=DOUBLE)
+        trials, found = columns.shape[1], np.empty((people, 9), dtype=DOUBLE)
         if particles < 2 or not trials:
             raise ValueError("particles move by differences of others, and learn from a trial")
         call(
@@ -222,8 +222,8 @@ class Law:
             *self._values(crowd.values, crowd.kinds),
             address(crowd.log_weights, DOUBLE, people, particles),
             address(crowd.log_likelihood, SINGLE, people, particles),
-            address(crowd.densities, SINGLE, people, particles, self.blocks),
-            address(found, DOUBLE, people, 6),
+            address(crowd.densities, SINGLE, people, particles, self.blocks + 1),
+            address(found, DOUBLE, people, 9),
         )
         return found
 
@@ -245,7 +245,7 @@ class Law:
 
     def nothing_known(self, people: int, particles: int) -> Singles:
         """Log densities of blocks of which none was worked out yet, (b, p, blocks)."""
-        return np.full((people, particles, self.blocks), UNKNOWN)
+        return np.full((people, particles, self.blocks + 1), UNKNOWN)
 
     def draws(self, particles: int, seeds: Seeds) -> tuple[Singles, IntArray]:
         """So many particles of the prior of each person: latents (b, p, d), and kinds (b, p, k).
@@ -295,14 +295,13 @@ class Law:
             address(dice, NATURAL, people),
             *self._values(values, kinds),
             address(log_likelihood, SINGLE, people, particles),
-            address(densities, SINGLE, people, particles, self.blocks),
+            address(densities, SINGLE, people, particles, self.blocks + 1),
             address(counts, SINGLE, people, 4),
         )
         return counts
 
     def _require_particles(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
         people, particles, latents = values.shape
-        within = latents == self.latents and kinds.shape == (people, particles, KINDS)
-        if not within or (kinds.view(NATURAL) > self._last).any():  # without a sign, what is below 0 is too large
+        if latents != self.latents or kinds.shape != (people, particles, KINDS):
             raise ValueError("these are no particles of this prior")
         return people, particles

@@ -13,20 +13,15 @@ from typing import Final
 
 import numpy as np
 
-from isiw.models.particles.compiled import Crowd, Law
 from isiw.models.particles.mixture import log_sum
-from isiw.models.shared.history import BY_CURVES, COUNTS, SHIFT, History
-from isiw.native.engine import log_likelihoods
-from isiw.types import BoolArray, FloatArray, Singles
+from isiw.models.shared.history import COUNTS, SHIFT, History
+from isiw.types import FloatArray
 
 STAKED: Final = np.array([0.25, 0.8])
 """Shares of a stake that are bet, the rest being kept: of a law that is a little wrong, and of one that is far off."""
 
 LARGEST: Final = 20.0
 """Log of the largest factor that is told."""
-
-EACH: Final = 4
-"""One in so many particles predicts; what all of them would say differs by less than a bet pays for."""
 
 NARROWEST: Final = 1e-3
 """A probability of a smaller amplitude is known to this: particles have no finer tails."""
@@ -79,30 +74,6 @@ class Bets:
         kept = 1.0 + STAKED[:, np.newaxis] * (paid[:, np.newaxis] - 1.0)
         log_won = self.log_won + np.log(np.maximum(kept, NARROWEST)).reshape(self.log_won.shape)
         return Bets(log_won, np.maximum(self.most, log_sum(log_won) - math.log(log_won.shape[1])))
-
-
-def probability_below(trial: History, crowd: Crowd, law: Law, who: BoolArray) -> FloatArray:
-    """Predictive probabilities of an amplitude below the lower and the upper end of a trial's, (b, 2).
-
-    Args:
-        trial: the trial of each person.
-        crowd: the weighted particles before it.
-        law: what they mean.
-        who: which particles predict it: of a pulse at another intensity recruitment curves alone, (b, p) (decision 45).
-    """
-    values, kinds = np.ascontiguousarray(crowd.values[:, ::EACH]), np.ascontiguousarray(crowd.kinds[:, ::EACH])
-    fields, weights = law.meanings(values, kinds, -1), np.exp(crowd.log_weights[:, ::EACH]) * who[:, ::EACH]
-    columns, ends = trial.columns.copy(), trial.columns[..., 2:4]
-    columns[..., 2], columns[..., BY_CURVES] = -np.inf, np.nan
-
-    def below(end: Singles) -> FloatArray:
-        columns[..., 3] = end
-        mass: FloatArray = np.exp(log_likelihoods(fields, columns), dtype=float)
-        return np.asarray((weights * mass).sum(-1) / np.maximum(weights.sum(-1), 1e-300))
-
-    high = below(ends[..., 1])
-    point = (ends[..., 0] == ends[..., 1]).all()
-    return np.stack((high if point else below(ends[..., 0]), high), axis=-1)
 
 
 def against_level(history: History, row: int) -> float | None:

@@ -16,7 +16,7 @@ import numpy as np
 from isiw.checks import Checked, Natural, Share
 from isiw.models.particles.compiled import Crowd, Law
 from isiw.models.particles.latents import Latents
-from isiw.models.particles.misfit import Bets, probability_below
+from isiw.models.particles.misfit import Bets
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
 from isiw.models.shared.draws import seeds
@@ -185,15 +185,22 @@ class Swarm:
         learnt, found = self._learnt(told, law, crowd, (moves.min_ess, sweeps, seeds(seed, trials, len(crowd.kinds))))
         with np.errstate(invalid="ignore"):  # where there were no moves, no share of them was accepted
             health = Health(found[:, 1], found[:, 3] / found[:, 2], found[:, 5] / found[:, 4])
-        return replace(learnt, bets=self._bets_after(trial, told, law), health=health)
+        return replace(learnt, bets=self._bets_after(told, found[:, 6:]), health=health)
 
-    def _bets_after(self, trial: History, told: History, law: Law) -> Bets:
-        """The bets after one more trial; none is on what counts as a part of one, whose predictions are too wide."""
+    def _bets_after(self, told: History, foretold: FloatArray) -> Bets:
+        """The bets after one more trial; none is on what counts as a part of one, whose predictions are too wide.
+
+        Args:
+            told: the trial as each half has it.
+            foretold: probabilities below its ends times weights, and these, summed, by half of each person, (rows, 3).
+        """
         if (told.columns[..., COUNTS] < 1).any():
             return self.bets
-        elsewhere = ~np.isnan(told.columns[:: self.halves, :, BY_CURVES])
-        who = ~elsewhere | self.of_given & recruits(self.latents.noise)
-        return self.bets.after(probability_below(trial, self.crowd, law, who))
+        sums = foretold.reshape(len(self.evidence), self.halves, 3)
+        elsewhere = ~np.isnan(told.columns[:: self.halves, 0, BY_CURVES])
+        sums[elsewhere, 1:] = 0.0  # of a pulse at another intensity those say nothing who do not learn from such pulses
+        below, weights = np.split(sums.sum(1), [2], axis=1)
+        return self.bets.after(below / np.maximum(weights, 1e-300))
 
     def weighed(self, trial: History, law: Law) -> Swarm:
         """The same particles, weighed by one more trial as well."""

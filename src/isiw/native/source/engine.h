@@ -1,12 +1,15 @@
 /* What Python calls: the law of particles over arrays. Sizes come with the arrays, and Python checks them before.
 
 Every function writes into the arrays that it is given, and returns 0, or -1 where there is no memory for what it needs
-in between. Single precision; indices are 64 bits. Arrays lie in C order: (b, p, d) are people, particles, latents. */
+in between, or NO_PARTICLES where kinds of particles are none that there are. Single precision; indices are 64 bits.
+Arrays lie in C order: (b, p, d) are people, particles, latents. */
 
 #ifndef ISIW_ENGINE_H
 #define ISIW_ENGINE_H
 
 #include <stdint.h>
+
+enum { NO_PARTICLES = 1 };
 
 /* What is known of a model's prior and of its moves; see `isiw.models.particles.compiled.Tables`. */
 typedef struct {
@@ -52,7 +55,8 @@ typedef struct {
                          double *found);
     /* Particles after one more trial, the last of the columns (b, n, COLUMNS), in place: weighed, resampled where fewer
     carry the posterior than a share, and moved so often where they were kept and where they were resampled. Found are
-    the log likelihood of the trial, the effective sample size as a share, and counts of moves, (b, 6). */
+    the log likelihood of the trial, the effective sample size as a share, counts of moves as of `sweeps`, and what was
+    foretold: probabilities of amplitudes below its two ends times weights, and the weights, summed, (b, 9). */
     int (*learn)(const Tables *tables, int64_t people, int64_t particles, int64_t trials, const float *columns,
                  double min_ess, int64_t kept, int64_t resampled, uint64_t *dice, float *values, int64_t *kinds,
                  double *log_weights, float *log_likelihood, float *densities, double *found);

@@ -10,6 +10,7 @@
 enum { CHANGE_KINDS = SCALE_CHANGE + 1, HYPOTHESES = 4 * CHANGE_KINDS };
 
 #define LEAST_SHARE 0.03       /* of the particles, that resampling leaves to a hypothesis, so that it can come back */
+#define PREDICTS 4             /* one particle in so many foretells an amplitude; all would say nearly the same */
 #define LEAST_PROBABILITY 1e-9 /* less probable hypotheses are left fewer particles */
 
 static int64_t hypothesis_of(const int64_t *kinds) {
@@ -57,6 +58,7 @@ typedef struct {
     float *fields, *likelihood;
     int64_t *picks;
     double *log_favour;
+    uint8_t *some;
     Trial *trials;
     Crowd fresh;
 } Room;
@@ -73,7 +75,7 @@ static void favour_rare(const Crowd *crowd, int64_t particles, double *log_favou
 }
 
 static void resample(const Tables *tables, Crowd *crowd, int64_t particles, const Room *room, uint64_t *dice) {
-    size_t latents = (size_t)tables->latents, blocks = (size_t)tables->blocks, count = (size_t)particles;
+    size_t latents = (size_t)tables->latents, blocks = (size_t)kept_of(tables), count = (size_t)particles;
     const Crowd *fresh = &room->fresh;
     int64_t *picks = room->picks;
     favour_rare(crowd, particles, room->log_favour);
@@ -98,39 +100,64 @@ static void resample(const Tables *tables, Crowd *crowd, int64_t particles, cons
     normalise(crowd->log_weights, particles);
 }
 
-/* Weigh particles by the last trial; the log of its likelihood under all of them. */
+/* Probabilities of amplitudes below the ends of a trial's, and the weights of those who predict them, summed. Of a
+pulse at another intensity recruitment curves alone do. */
+static void foretell(const Crowd *crowd, int64_t particles, Trial trial, const Room *room, double *found) {
+    float ends[2] = {trial.of[LOW], trial.of[HIGH]};
+    for (int64_t i = 0; i < particles; i++)
+        room->some[i] = i % PREDICTS == 0 && (!trial.of_curves || is_curved(room->fields + i * FIELDS));
+    trial.of[LOW] = -INFINITY, trial.of_curves = 0;
+    found[0] = found[1] = found[2] = 0.0;
+    for (int end = 0; end < 2; end++) {
+        trial.of[HIGH] = ends[end];
+        if (!end || ends[0] != ends[1])
+            person_likelihood(room->fields, particles, room->some, &trial, 1, trial.of[KNOWN_LOG_SD] > 0.0f,
+                              room->likelihood);
+        for (int64_t i = 0; i < particles; i += PREDICTS)
+            if (room->some[i]) found[end] += exp(crowd->log_weights[i] + room->likelihood[i]);
+    }
+    for (int64_t i = 0; i < particles; i += PREDICTS)
+        if (room->some[i]) found[2] += exp(crowd->log_weights[i]);
+}
+
+/* Weigh particles by the last trial; the log of its likelihood under all of them, and what was foretold of it. */
 static double weigh(const Tables *tables, Crowd *crowd, int64_t particles, const float *columns, int64_t count,
-                    const Room *room) {
+                    const Room *room, double *foretold) {
     meanings(tables, 1, particles, crowd->values, crowd->kinds, -1, room->fields);
     int shares = trials_of(columns, count, room->trials); /* then all trials depend on each other */
+    foretell(crowd, particles, room->trials[count - 1], room, foretold);
     const Trial *from = shares ? room->trials : room->trials + count - 1;
     person_likelihood(room->fields, particles, NULL, from, shares ? count : 1, shares, room->likelihood);
     for (int64_t i = 0; i < particles; i++) {
         float gain = shares ? room->likelihood[i] - crowd->log_likelihood[i] : room->likelihood[i];
         crowd->log_weights[i] += gain, crowd->log_likelihood[i] += gain;
+        /* what is unknown stays so: it is too large to change */
+        if (is_of_part(count - 1)) crowd->densities[i * kept_of(tables) + tables->blocks] += gain;
     }
     return normalise(crowd->log_weights, particles);
 }
 
-enum { OF_A_TRIAL = 6 }; /* numbers that are found: log likelihood, effective sample size, and counts of moves */
+enum { OF_A_TRIAL = 9 }; /* numbers that are found, see engine.h */
 
 static int learn(const Tables *tables, int64_t people, int64_t particles, int64_t count, const float *columns,
                  double min_ess, int64_t kept, int64_t resampled, uint64_t *dice, float *values, int64_t *kinds,
                  double *log_weights, float *log_likelihood, float *densities, double *found) {
+    if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
     size_t each = (size_t)particles;
-    int64_t latents = tables->latents, blocks = tables->blocks;
+    int64_t latents = tables->latents, blocks = kept_of(tables);
     Room room = {.fields = malloc(each * FIELDS * sizeof(float)),
                  .likelihood = malloc(each * sizeof(float)),
                  .picks = malloc(each * sizeof(int64_t)),
                  .log_favour = malloc(each * sizeof(double)),
+                 .some = malloc(each),
                  .trials = malloc((size_t)count * sizeof(Trial)),
                  .fresh = {.values = malloc(each * (size_t)latents * sizeof(float)),
                            .log_likelihood = malloc(each * sizeof(float)),
                            .densities = malloc(each * (size_t)blocks * sizeof(float)),
                            .kinds = malloc(each * KINDS * sizeof(int64_t))}};
     Crowd *fresh = &room.fresh;
-    int failed = !(room.fields && room.likelihood && room.picks && room.log_favour && room.trials && fresh->values &&
-                   fresh->log_likelihood && fresh->densities && fresh->kinds);
+    int failed = !(room.fields && room.likelihood && room.picks && room.log_favour && room.some && room.trials &&
+                   fresh->values && fresh->log_likelihood && fresh->densities && fresh->kinds);
     for (int64_t person = 0; !failed && person < people; person++) {
         int64_t at = person * particles;
         const float *told = columns + person * count * COLUMNS;
@@ -138,7 +165,7 @@ static int learn(const Tables *tables, int64_t people, int64_t particles, int64_
                        log_weights + at};
         double *of_person = found + person * OF_A_TRIAL;
         float counts[4] = {0.0f};
-        of_person[0] = weigh(tables, &crowd, particles, told, count, &room);
+        of_person[0] = weigh(tables, &crowd, particles, told, count, &room, of_person + 6);
         of_person[1] = ess_of(crowd.log_weights, particles);
         int worn = of_person[1] < min_ess;
         if (worn) resample(tables, &crowd, particles, &room, dice + person);
@@ -148,7 +175,8 @@ static int learn(const Tables *tables, int64_t people, int64_t particles, int64_
                             crowd.log_likelihood, crowd.densities, counts);
         for (int i = 0; i < 4; i++) of_person[2 + i] = counts[i];
     }
-    free(room.fields), free(room.likelihood), free(room.picks), free(room.log_favour), free(room.trials);
+    free(room.fields), free(room.likelihood), free(room.picks), free(room.log_favour), free(room.some);
+    free(room.trials);
     free(fresh->values), free(fresh->log_likelihood), free(fresh->densities), free(fresh->kinds);
     return failed ? -1 : 0;
 }
@@ -156,12 +184,13 @@ static int learn(const Tables *tables, int64_t people, int64_t particles, int64_
 static int usual_weights(const Tables *tables, const Tables *usual, int64_t people, int64_t particles,
                          const float *values, const int64_t *kinds, const float *densities, const double *log_weights,
                          double *found) {
+    if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
     for (int64_t first = 0, count = people * particles; first < count; first += LANES) {
         int64_t numbers[LANES], left = count - first;
         const float *known[LANES];
         for (int64_t lane = 0; lane < LANES; lane++) {
             numbers[lane] = first + lane;
-            known[lane] = densities + (first + (lane < left ? lane : left - 1)) * tables->blocks;
+            known[lane] = densities + (first + (lane < left ? lane : left - 1)) * kept_of(tables);
         }
         Lanes lanes = lanes_of(values, tables->latents, kinds, numbers, left);
         Reals own = log_usual(tables, &lanes, known), others = log_usual(usual, &lanes, NULL);
@@ -175,6 +204,7 @@ static int usual_weights(const Tables *tables, const Tables *usual, int64_t peop
 static int represent(const Tables *tables, int64_t people, int64_t particles, int64_t size, int64_t trials,
                      const float *values, const int64_t *kinds, const double *log_weights, int64_t *picks,
                      float *fields) {
+    if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
     float *room = malloc((size_t)particles * FIELDS * sizeof *room);
     if (!room) return -1;
     for (int64_t person = 0; person < people; person++) {

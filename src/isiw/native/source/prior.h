@@ -44,6 +44,19 @@ enum { MOST_OF_BLOCK = 32, MOST_BLOCKS = 64 }; /* how many latents a block has, 
 #define INTENSITY_PCT 9.0f  /* by how much the intensity changes at a size of 1 [% RMT] */
 #define FADING_HALVES 0.04f /* by how many halves the enhancement changes from trial to trial at a size of 1 */
 
+/* How many numbers are kept with a particle: the log densities of its blocks, and its log likelihood by a part of the
+trials, which moves screen proposals by. */
+INLINE int64_t kept_of(const Tables *tables) { return tables->blocks + 1; }
+
+/* Whether kinds (p, KINDS) are some that there are. */
+static int known_kinds(const Tables *tables, int64_t particles, const int64_t *kinds) {
+    uint64_t changes = (uint64_t)tables->kind_values, beyond = 0;
+    const uint64_t last[KINDS] = {TWO_PEAK, RECTIFIED, 1, 1, changes < SCALE_CHANGE ? changes : SCALE_CHANGE};
+    for (int64_t i = 0; i < particles; i++)
+        for (int kind = 0; kind < KINDS; kind++) beyond |= (uint64_t)kinds[i * KINDS + kind] > last[kind];
+    return !beyond;
+}
+
 /* Latents of particles side by side: where those of each lane begin, and its kinds. */
 typedef struct {
     const float *z[LANES];
@@ -254,6 +267,7 @@ static void draw_block(const Tables *tables, int64_t block, uint64_t *dice, floa
 
 static int meanings(const Tables *tables, int64_t people, int64_t particles, const float *values, const int64_t *kinds,
                     int64_t trials, float *fields) {
+    if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
     for (int64_t first = 0, count = people * particles; first < count; first += LANES) {
         int64_t numbers[LANES], left = count - first < LANES ? count - first : LANES;
         for (int64_t lane = 0; lane < LANES; lane++) numbers[lane] = first + lane;
