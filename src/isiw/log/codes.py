@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 import unicodedata
 from collections.abc import Iterator
 from contextlib import suppress
@@ -11,12 +12,10 @@ from pathlib import Path
 from mcap import records as mcap
 from mcap.stream_reader import StreamReader
 
-from isiw.errors import InvalidValueError, LogError
+from isiw.errors import InvalidValueError
 from isiw.log.blocks import UNREADABLE
 from isiw.log.headers import AnyHeader, ProductionHeader
-from isiw.log.kinds import LogKind
-from isiw.log.reader import LoggedSession, read_any, topics_of
-from isiw.log.salvage import salvage_file
+from isiw.log.schema import CONFIGURATION
 from isiw.opening import opened
 from isiw.text.sanitize import plain
 
@@ -36,7 +35,7 @@ def require_one_spelling(folder: Path, header: AnyHeader) -> None:
     if isinstance(header, ProductionHeader) or header.device.simulated:
         return
     for log, code in _codes(folder):
-        if code != header.subject and is_same_person(code, header.subject) and not _is_simulated(log):
+        if code != header.subject and is_same_person(code, header.subject):
             raise InvalidValueError(
                 "the person's code differs from another log's only in case, spaces, hyphens or underscores",
                 got=header.subject,
@@ -45,28 +44,21 @@ def require_one_spelling(folder: Path, header: AnyHeader) -> None:
             )
 
 
-def _is_simulated(log: Path) -> bool:
-    """True if nobody was stimulated by a log."""
-    with suppress(LogError):
-        return read_any(salvage_file(log, topics_of(())), LogKind.SEARCH, LoggedSession).header.device.simulated
-    return False
-
-
 def _codes(folder: Path) -> Iterator[tuple[Path, str]]:
-    """The logs in a folder, and the code of each."""
-    try:
-        files = sorted(file for file in folder.iterdir() if file.is_file())
-    except OSError:  # there is none yet
-        return
-    for file in files:
-        if (code := _code(file)) is not None:
-            yield file, code
+    """The logs of people in a folder, and the code of each."""
+    with suppress(OSError):  # there is no folder yet
+        for file in sorted(file for file in folder.iterdir() if file.is_file()):
+            if (code := _code(file)) is not None:
+                yield file, code
 
 
 def _code(file: Path) -> str | None:
-    """The code in the metadata at a log's beginning, before its blocks; None if it cannot be read."""
-    with suppress(OSError, *UNREADABLE), opened(file) as log:
+    """The code in the header that a log begins with, before its blocks; None of nobody, and if it cannot be read."""
+    with suppress(OSError, ValueError, LookupError, TypeError, *UNREADABLE), opened(file) as log:
         for record in StreamReader(log, emit_chunks=True).records:
-            if isinstance(record, mcap.Metadata) and record.name == "session":
-                return record.metadata.get("subject")
+            if isinstance(record, mcap.Attachment) and record.name == CONFIGURATION:
+                header = tomllib.loads(record.data.decode())
+                return None if header["device"]["simulated"] else str(header["subject"])
+            if isinstance(record, mcap.Chunk):
+                return None
     return None
