@@ -14,9 +14,9 @@ import numpy as np
 from isiw.checks import number
 from isiw.devices.allowed import require_isi
 from isiw.devices.clock import Clock
-from isiw.devices.info import DeviceInfo, Readiness
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, require_staged
+from isiw.devices.protocol import Answer, Device, Readiness, require_staged
 from isiw.errors import DeviceError, NotDelivered
 from isiw.log.record import SessionRecord
 from isiw.log.schema import Event, Intent

@@ -26,11 +26,11 @@ from .devices.clock import MonotonicClock as MonotonicClock
 from .devices.clock import VirtualClock as VirtualClock
 from .devices.deadlines import Deadlines as Deadlines
 from .devices.info import DeviceInfo as DeviceInfo
-from .devices.info import Readiness as Readiness
 from .devices.limits import Limits as Limits
 from .devices.limits import PulseLimits as PulseLimits
 from .devices.protocol import CallbackDevice as CallbackDevice
 from .devices.protocol import Device as Device
+from .devices.protocol import Readiness as Readiness
 from .devices.robot.tapper import Tapper as Tapper
 from .devices.robot.tapper import TapperSettings as TapperSettings
 from .devices.robot.vane.rotation import Rotor as Rotor

@@ -10,6 +10,7 @@ These branches have been type-checked, and have not been run.
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import re
 import stat
@@ -17,11 +18,12 @@ import sys
 import unicodedata
 import uuid
 from contextlib import suppress
+from io import BufferedReader
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Final, cast
 
 from isiw.errors import DiskWarning, InvalidValueError, warn
-from isiw.opening import is_mcap
+from isiw.opening import opened
 
 if sys.platform == "darwin":
     import fcntl
@@ -238,3 +240,21 @@ def _taken(target: Path) -> InvalidValueError:
         got=str(target),
         remedy="Choose another path, or replace it: --overwrite, or overwrite=True.",
     )
+
+
+_LOG: Final = b"\x89MCAP"
+"""What every log begins with."""
+
+
+def is_mcap(path: Path) -> bool:
+    """True if a file begins as every log does, whatever its name."""
+    if not path.is_file():
+        return False
+    with opened(path) as file:
+        return file.read(len(_LOG)) == _LOG
+
+
+def hash_of(path: Path) -> str:
+    """The SHA-256 of a file."""
+    with opened(path) as file:
+        return hashlib.file_digest(cast("BufferedReader", file), "sha256").hexdigest()

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import os
 import stat
-from io import BufferedReader
 from pathlib import Path
-from typing import IO, Final, cast
-
-_LOG: Final = b"\x89MCAP"
-"""What every log begins with."""
+from typing import IO
 
 
 def opened(path: Path, *, links: bool = True) -> IO[bytes]:
@@ -22,17 +17,3 @@ def opened(path: Path, *, links: bool = True) -> IO[bytes]:
         return file
     file.close()
     raise OSError(errno.EINVAL, "it is no regular file", str(path))
-
-
-def is_mcap(path: Path) -> bool:
-    """True if a file begins as every log does, whatever its name."""
-    if not path.is_file():
-        return False
-    with opened(path) as file:
-        return file.read(len(_LOG)) == _LOG
-
-
-def hash_of(path: Path) -> str:
-    """The SHA-256 of a file."""
-    with opened(path) as file:
-        return hashlib.file_digest(cast("BufferedReader", file), "sha256").hexdigest()

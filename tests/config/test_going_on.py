@@ -9,7 +9,7 @@ import pytest
 
 from isiw.config import load_config
 from isiw.config.resume import changes_on_resume, differences_on_resume
-from isiw.devices.info import Readiness
+from isiw.devices.protocol import Readiness
 from isiw.log.record import SessionRecord, read_session
 from isiw.session.loop import Session
 from isiw.session.resume import open_session

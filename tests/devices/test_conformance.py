@@ -18,10 +18,10 @@ import pytest
 
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
-from isiw.devices.info import DeviceInfo, Readiness
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import CallbackDevice
+from isiw.devices.protocol import CallbackDevice, Readiness
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import RecordedPerson, RecordedTrials, Recordings, SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered

@@ -10,7 +10,7 @@ from typing import Any, Never, TypeAlias
 import pytest
 
 from isiw.devices.deadlines import Deadlines, PunctualDevice
-from isiw.devices.info import Readiness
+from isiw.devices.protocol import Readiness
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered, StillArmedError
 from isiw.sweeps import Measurement
 from isiw.trials import Stimulus

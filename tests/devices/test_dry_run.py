@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.devices.info import Readiness
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import Readiness
 from isiw.devices.simulated import DryRun
 from isiw.errors import LimitExceededError
 from isiw.log.record import read_session

@@ -6,9 +6,10 @@ from typing import Any, Never, cast
 import pytest
 
 from isiw.devices.clock import MonotonicClock, VirtualClock
-from isiw.devices.info import DeviceInfo, Readiness
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import Readiness
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, NotDelivered
 from isiw.sweeps import Measurement
 from isiw.trials import Stimulus

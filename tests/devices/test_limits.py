@@ -8,7 +8,6 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.devices.allowed import earliest_s, require_isi, require_state
-from isiw.devices.info import Readiness
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.session.stated import require_limits
@@ -124,7 +123,7 @@ def test_no_period_holds_more_stimuli_than_its_limit() -> None:
 @pytest.mark.parametrize(("coil_c", "way_on"), [(None, "report coil_c"), (40.1, "coil cool"), (99.0, "coil cool")])
 def test_a_coil_that_is_hot_or_not_measured_is_refused_with_the_way_on(coil_c: float | None, way_on: str) -> None:
     with pytest.raises(LimitExceededError, match=f"{way_on}, then resume"):
-        require_state(Limits(0, 200, max_coil_c=40.0), Readiness(coil_c=coil_c))
+        require_state(Limits(0, 200, max_coil_c=40.0), coil_c)
 
 
 @pytest.mark.parametrize(
@@ -132,14 +131,12 @@ def test_a_coil_that_is_hot_or_not_measured_is_refused_with_the_way_on(coil_c: f
 )
 def test_another_or_an_unknown_intensity_is_refused_with_the_way_on(intensity: float | None, way_on: str) -> None:
     with pytest.raises(LimitExceededError, match=f"{way_on}, then resume"):
-        require_state(Limits(0, 200, intensity_pct_mso=55.0), Readiness(intensity_pct_mso=intensity))
+        require_state(Limits(0, 200, intensity_pct_mso=55.0), intensity_pct_mso=intensity)
 
 
 def test_a_state_within_the_limits_is_accepted() -> None:
-    require_state(
-        Limits(0, 200, max_coil_c=40.0, intensity_pct_mso=55.0), Readiness(coil_c=40.0, intensity_pct_mso=55.0)
-    )
-    require_state(Limits(0, 200), Readiness())
+    require_state(Limits(0, 200, max_coil_c=40.0, intensity_pct_mso=55.0), 40.0, 55.0)
+    require_state(Limits(0, 200))
 
 
 @pytest.mark.parametrize("max_coil_c", [4000.0, 104.0])

@@ -326,7 +326,7 @@ def test_moments_outside_the_sweep_are_left_out_as_they_would_lie_in_another_tri
 
 
 def test_two_people_whose_codes_become_one_label_are_refused(tmp_path: Path) -> None:
-    for number, subject in enumerate(("P-07", "p07")):
+    for number, subject in enumerate(("P.07", "p07")):
         write_sweeps(tmp_path / "logs" / f"{number}.mcap", {0: {}}, subject=subject)
     with pytest.raises(InvalidValueError, match="--pseudonymise"):
         export_logs(tmp_path / "logs", tmp_path / "out", "bids")

@@ -16,7 +16,7 @@ import pytest
 
 from isiw import schedule
 from isiw.devices.clock import VirtualClock
-from isiw.devices.info import Readiness
+from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LogError, StrategyError
 from isiw.existing.reading import read_people
 from isiw.export.collection import read_logs

@@ -9,9 +9,9 @@ import isiw
 from isiw.config.run import RunConfig
 from isiw.config.session import session_for
 from isiw.devices.clock import VirtualClock
-from isiw.devices.info import Readiness
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import Readiness
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import recalled

@@ -12,8 +12,8 @@ import pytest
 
 from forked import Forked
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.devices.info import Readiness
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import Readiness
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind

@@ -12,8 +12,8 @@ from benchmarks.faulty_device import Fault, FaultyDevice, Fired, check_ledger
 from benchmarks.soak import Soaked, check
 
 from isiw.devices.clock import VirtualClock
-from isiw.devices.info import Readiness
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import Readiness
 from isiw.errors import DeviceError, NotDelivered
 from isiw.log.record import SessionRecord, read_session
 from isiw.session.loop import Session

@@ -1,7 +1,8 @@
 from __future__ import annotations
 
+from isiw.log.frames import meanings
 from isiw.summary import words_of
-from isiw.text.stimuli import STIMULI, TAP, meanings
+from isiw.text.stimuli import STIMULI, TAP
 
 
 def test_sessions_with_one_stimulus_have_its_words_and_sessions_with_both_have_both() -> None:

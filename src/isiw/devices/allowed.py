@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from isiw.devices.info import Readiness
 from isiw.devices.limits import Limits, PulseLimits
 from isiw.errors import LimitExceededError
 
@@ -36,9 +35,9 @@ def require_intensity(limits: PulseLimits, pct_rmt: float | None) -> None:
         )
 
 
-def require_state(limits: PulseLimits, state: Readiness) -> None:
-    """Raise LimitExceededError if the device reports a hot coil or another intensity, or lacks what is limited."""
-    coil_c, intensity, own = state.coil_c, state.intensity_pct_mso, limits.intensity_pct_mso
+def require_state(limits: PulseLimits, coil_c: float | None = None, intensity_pct_mso: float | None = None) -> None:
+    """Raise LimitExceededError if the coil is hot, the intensity another one, or what is limited not reported."""
+    own = limits.intensity_pct_mso
     if limits.max_coil_c is not None and not (coil_c is not None and coil_c <= limits.max_coil_c):
         way_on = "Let the device's readiness() report coil_c" if coil_c is None else "Let the coil cool"
         raise LimitExceededError(
@@ -47,14 +46,14 @@ def require_state(limits: PulseLimits, state: Readiness) -> None:
             expected=f"at most {limits.max_coil_c:g} °C",
             remedy=f"This stimulus was not delivered. {way_on}, then resume the session.",
         )
-    if own is not None and (intensity is None or abs(intensity - own) > _SAME_PCT_MSO):
+    if own is not None and (intensity_pct_mso is None or abs(intensity_pct_mso - own) > _SAME_PCT_MSO):
         reporting = "Let the device's readiness() report intensity_pct_mso"
         raise LimitExceededError(
             "the intensity is not the session's, or is not known",
-            got="no intensity" if intensity is None else f"{intensity:g} % MSO",
+            got="no intensity" if intensity_pct_mso is None else f"{intensity_pct_mso:g} % MSO",
             expected=f"{own:g} % MSO",
             remedy="This stimulus was not delivered. "
-            f"{reporting if intensity is None else 'Set the intensity back'}, then resume the session.",
+            f"{reporting if intensity_pct_mso is None else 'Set the intensity back'}, then resume the session.",
         )
 
 

@@ -12,8 +12,8 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from isiw.checks import Checked, Count, Patience
-from isiw.devices.info import DeviceInfo, Readiness
-from isiw.devices.protocol import Answer, Device, ReportsReadiness, info_of, readiness_of, require_staged
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import Answer, Device, Readiness, ReportsReadiness, info_of, readiness_of, require_staged
 from isiw.errors import DeviceError, DeviceTimeoutError, StillArmedError, error_text
 from isiw.trials import Stimulus
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from isiw.checks import Checked, Count, Flag, MeanAndSd, NonNegative, Number, SmallestAmplitude, Text, text
+from isiw.checks import Checked, Count, Flag, MeanAndSd, NonNegative, SmallestAmplitude, Text, text
 from isiw.errors import InvalidValueError
 from isiw.types import Conditioning, Reference
 
@@ -66,23 +66,3 @@ class DeviceInfo(Checked):
         for channel, unit in self.channels.items():
             text("the name of a channel in DeviceInfo.channels", channel)
             text(f"the unit of {channel!r} in DeviceInfo.channels", unit)
-
-
-@dataclass(frozen=True)
-class Readiness(Checked):
-    """A device's state before a stimulus, as it reports it.
-
-    Args:
-        ready: whether it could fire now.
-        reason: why it is not ready.
-        coil_c: temperature of the coil [°C]; None if it is not measured.
-        intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None if it is not known.
-
-    Raises:
-        InvalidValueError: `ready` that is neither True nor False, a value that is not finite, or an intensity below 0.
-    """
-
-    ready: Flag = True
-    reason: str = ""
-    coil_c: Number | None = None
-    intensity_pct_mso: NonNegative | None = None

@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 
 from isiw.devices.allowed import require_intensity, require_isi, require_left, require_state
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing, VirtualClock
-from isiw.devices.info import DeviceInfo, Readiness
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, readiness_of, require_staged
+from isiw.devices.protocol import Answer, Device, Readiness, readiness_of, require_staged
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
 from isiw.visit import Visit
@@ -134,7 +134,7 @@ class LimitedDevice:
                 f"the device is not ready: {state.reason or 'it does not say why'}",
                 remedy="This stimulus was not delivered. Continue when the device is ready.",
             )
-        require_state(self._limits, state)
+        require_state(self._limits, state.coil_c, state.intensity_pct_mso)
         require_set(self._noted, self._last_set_pct_rmt, state)
         if self._dead_man is not None and self._dead_man() is not True:
             raise LimitExceededError(

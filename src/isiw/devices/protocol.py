@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Final, Protocol, TypeAlias, runtime_checkable
 
-from isiw.devices.info import DeviceInfo, Readiness
+from isiw.checks import Checked, Flag, NonNegative, Number
+from isiw.devices.info import DeviceInfo
 from isiw.errors import DeviceError, NotDelivered
 from isiw.sweeps import Measurement, Sweep
 from isiw.trials import Stimulus
@@ -47,6 +49,26 @@ class Device(Protocol):
 
     def unstage(self) -> None:
         """Let go of what `stage` took; calling it again is harmless."""
+
+
+@dataclass(frozen=True)
+class Readiness(Checked):
+    """A device's state before a stimulus, as it reports it.
+
+    Args:
+        ready: whether it could fire now.
+        reason: why it is not ready.
+        coil_c: temperature of the coil [°C]; None if it is not measured.
+        intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None if it is not known.
+
+    Raises:
+        InvalidValueError: `ready` that is neither True nor False, a value that is not finite, or an intensity below 0.
+    """
+
+    ready: Flag = True
+    reason: str = ""
+    coil_c: Number | None = None
+    intensity_pct_mso: NonNegative | None = None
 
 
 @runtime_checkable

@@ -13,8 +13,8 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from isiw.devices.info import DeviceInfo, Readiness
-from isiw.devices.protocol import Answer, Device, readiness_of, require_staged
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import Answer, Device, Readiness, readiness_of, require_staged
 from isiw.devices.robot.waveforms import scale_of_mep
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.lazy import pd

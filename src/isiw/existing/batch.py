@@ -18,9 +18,8 @@ from isiw.existing.delivered import Delivered, codes_of
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
 from isiw.existing.reading import read_people
-from isiw.files import folded, is_reserved
+from isiw.files import folded, hash_of, is_reserved
 from isiw.log.places import log_exists
-from isiw.opening import hash_of
 from isiw.visit import Visit
 
 if TYPE_CHECKING:  # a file is read, and perhaps refused, before what analyses it is loaded

@@ -24,8 +24,9 @@ from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits, limit_memory, limit_time, seconds_for
 from isiw.existing.look import seen_in
 from isiw.existing.reading import contents_in, people_of_contents
+from isiw.files import hash_of
 from isiw.lazy import pd
-from isiw.opening import hash_of, opened
+from isiw.opening import opened
 from isiw.text.named_code import library
 from isiw.text.toml_files import checked
 

@@ -23,10 +23,10 @@ from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import CHANNELS, EMG_UNITS, Layout
 from isiw.existing.limits import ReadingLimits, require_file, require_most, require_table
 from isiw.existing.quantities import Columns
+from isiw.files import is_mcap
 from isiw.findings import INTENSITY_PCT, Kind
 from isiw.lazy import pd
 from isiw.log.places import log_exists
-from isiw.opening import is_mcap
 from isiw.signals.judgement import judge_measurement
 from isiw.signals.limits import SignalLimits
 from isiw.sweeps import Measurement

@@ -14,16 +14,17 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from isiw.errors import InvalidValueError, LogError
+from isiw.files import hash_of
 from isiw.findings import Kind
+from isiw.log.durable import kept_for
 from isiw.log.headers import Header
-from isiw.log.places import kept_for, part_of
+from isiw.log.places import part_of
 from isiw.log.reader import topics_of
 from isiw.log.record import SessionRecord, read_salvaged, read_session
 from isiw.log.records import Onset
 from isiw.log.salvage import only_in, salvage_file
 from isiw.log.schema import Event
 from isiw.log.verdicts import VERDICTS
-from isiw.opening import hash_of
 from isiw.summary import words_of
 from isiw.text.sanitize import counted
 from isiw.text.stimuli import StimulusWords

@@ -14,11 +14,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from isiw.log.frames import TRIAL_COLUMNS
+from isiw.log.frames import TRIAL_COLUMNS, meanings
 from isiw.log.record import SessionRecord
 from isiw.sweeps import Channel
 from isiw.text.named_code import library
-from isiw.text.stimuli import TAP, StimulusWords, meanings
+from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Stimulus, Trial
 from isiw.types import FloatArray
 

@@ -13,10 +13,10 @@ from isiw.export.collection import Part, log_losses, stimulus_of
 from isiw.figures import Estimate
 from isiw.files import write_output
 from isiw.lazy import pd
-from isiw.log.frames import trial_columns, trial_frame
+from isiw.log.frames import meanings, trial_columns, trial_frame
 from isiw.log.record import SessionRecord
 from isiw.text.sanitize import one_line
-from isiw.text.stimuli import STIMULI, TAP, StimulusWords, meanings
+from isiw.text.stimuli import STIMULI, TAP, StimulusWords
 
 Columns = Mapping[str, tuple[str, str]]
 

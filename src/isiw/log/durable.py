@@ -18,11 +18,13 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Final
 
 from isiw.errors import LogError, os_errors
 from isiw.files import force, new_file, sync_folder, take_free_place
-from isiw.log.places import DAMAGED
+
+DAMAGED: Final = ".damaged"
+"""Ends the name of a damaged log that is kept."""
 
 
 class DurableFile:
@@ -158,6 +160,12 @@ def begun(path: Path, wanted: Path | None = None) -> Iterator[DurableFile]:
         file.abandon()
         path.unlink(missing_ok=True)
         raise
+
+
+def kept_for(path: Path) -> Path | None:
+    """The log whose damaged file is kept at a path; None if the path's name does not say so."""
+    name, damaged, number = path.name.rpartition(DAMAGED)
+    return path.with_name(name) if damaged and name and (number.isdecimal() or not number) else None
 
 
 def keep_damaged(damaged: Path, target: Path) -> None:

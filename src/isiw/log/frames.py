@@ -12,7 +12,7 @@ from isiw.log.schema import EstimateRecord
 from isiw.signals.measures import Measures, measures
 from isiw.signals.tap import TapResponses
 from isiw.sweeps import Sweep
-from isiw.text.stimuli import TAP, StimulusWords, meanings
+from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 
 
@@ -66,6 +66,11 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "expected_f1": ("", "posterior mean of the F1 of the reported window"),
     "next_isi_ms": ("ms", "the ISI that was chosen next"),
 }
+
+
+def meanings(columns: Mapping[str, tuple[str, str]], first: StimulusWords, **more: str) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of the columns of a table, of a stimulus."""
+    return {name: (unit, meaning.format(first, **more)) for name, (unit, meaning) in columns.items()}
 
 
 def trial_columns(first: StimulusWords) -> dict[str, tuple[str, str]]:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import IO, Final, NamedTuple, Self
+from typing import IO, NamedTuple, Self
 
 from isiw.errors import LogError
-
-DAMAGED: Final = ".damaged"
-"""Ends the name of a damaged log that is kept."""
 
 
 class Fingerprint(NamedTuple):
@@ -44,9 +41,3 @@ def log_of(path: Path) -> Path:
 def log_exists(log: Path) -> bool:
     """True if there is a log of this name, finished or still being written."""
     return log.exists() or part_of(log).exists()
-
-
-def kept_for(path: Path) -> Path | None:
-    """The log whose damaged file is kept at a path; None if the path's name does not say so."""
-    name, damaged, number = path.name.rpartition(DAMAGED)
-    return path.with_name(name) if damaged and name and (number.isdecimal() or not number) else None

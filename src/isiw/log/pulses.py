@@ -15,15 +15,17 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.files import is_mcap
 from isiw.log.codes import is_same_person
+from isiw.log.durable import kept_for
 from isiw.log.headers import Header
 from isiw.log.kinds import LogKind
 from isiw.log.moments import Ages, Moment
-from isiw.log.places import kept_for, log_exists, log_of
+from isiw.log.places import log_exists, log_of
 from isiw.log.reader import LoggedSession, of_production, read_any
 from isiw.log.salvage import Salvage, holds, salvage
 from isiw.log.schema import Event, Intent, Message, Record, decode
-from isiw.opening import is_mcap, opened
+from isiw.opening import opened
 from isiw.text.sanitize import counted, plain
 from isiw.trials import Trial
 

@@ -14,6 +14,7 @@ import isiw
 from isiw.checks import MOST_OF_A_KIND, Checked, share, whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, LogError
+from isiw.files import hash_of
 from isiw.log.codes import spelling
 from isiw.log.reader import ThresholdRecord
 from isiw.log.record import SessionRecord, read_any
@@ -23,7 +24,6 @@ from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import MOST_APART_MS, Place
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior, ShapeShares
-from isiw.opening import hash_of
 from isiw.priors.covariates import Slope, expected, slopes_of
 from isiw.priors.days import (
     after_pulses,

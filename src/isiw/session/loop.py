@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Unpack
 
 from isiw.decision import StopDecision
-from isiw.devices.info import Readiness
-from isiw.devices.protocol import Device
+from isiw.devices.protocol import Device, Readiness
 from isiw.errors import ClockWarning, NotDelivered, warn
 from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulse_ages

@@ -12,7 +12,6 @@ from isiw.checks import flag, number
 from isiw.decision import StopDecision
 from isiw.devices.allowed import require_intensity, require_isi, require_left, require_state
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
-from isiw.devices.info import Readiness
 from isiw.errors import ClockWarning, InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import REMEDIES, Finding, Kind, Severity
@@ -180,7 +179,7 @@ class Recorder(Recording[Trial], Judging):
             if self.asked is not None:  # TMS alone that was given, and never told
                 self._conclude(Trial.unknown(self.asked))
             require_left(self._limits, self._given_before + len(self.trials))
-            require_state(self._limits, Readiness())
+            require_state(self._limits)
             if self.wait_s() > ROUNDING_S:
                 return None
             isi_ms = self.strategy.ask(deadline_s)

@@ -14,9 +14,9 @@ from isiw.checks import number
 from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import PunctualDevice
-from isiw.devices.info import DeviceInfo, Readiness
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DiesArmed, HasMemory, readiness_of
+from isiw.devices.protocol import Answer, Device, DiesArmed, HasMemory, Readiness, readiness_of
 from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, NotDelivered, StillArmedError, error_text
 from isiw.findings import Kind
 from isiw.log.schema import waveform_topic

@@ -73,8 +73,3 @@ STIMULI: Final[Mapping[Conditioning, StimulusWords]] = MappingProxyType(
 """The words for each conditioning stimulus."""
 
 TAP: Final = STIMULI["tap"]
-
-
-def meanings(columns: Mapping[str, tuple[str, str]], first: StimulusWords, **more: str) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of the columns of a table, of a stimulus."""
-    return {name: (unit, meaning.format(first, **more)) for name, (unit, meaning) in columns.items()}

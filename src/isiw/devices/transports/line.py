@@ -13,8 +13,8 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from isiw.checks import text
-from isiw.devices.info import DeviceInfo, Readiness
-from isiw.devices.protocol import Answer, require_staged
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import Answer, Readiness, require_staged
 from isiw.devices.transports.exchange import described, from_table
 from isiw.devices.transports.line_exchange import Line, LineSettings
 from isiw.devices.transports.line_table import (

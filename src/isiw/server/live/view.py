@@ -12,8 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from isiw.devices.info import Readiness
-from isiw.devices.protocol import unprotected
+from isiw.devices.protocol import Readiness, unprotected
 from isiw.log.continuing import continued_by
 from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, Intent, Record, Waveform
