@@ -38,7 +38,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     So tests of one room meet in one worker, which makes once what they share, and loads once what they alone need.
     """
-    from xdist.scheduler import WorkStealingScheduling  # type: ignore[import-untyped]  # noqa: PLC0415 - where there are no workers it may be missing
+    from xdist.scheduler import WorkStealingScheduling  # noqa: PLC0415 - where there are no workers it may be missing
 
     return WorkStealingScheduling(config, log) if config.getoption("dist") == "load" else None
 
