@@ -407,7 +407,7 @@ def test_a_visit_with_pulses_over_the_curve_needs_the_log_of_all_of_them(
     space, log = IntensityRange(20, 80), tmp_path / "c.mcap"
     plan = f"{VISIT}curve = {{ at_pct_mso = [45, 55.0], each = 2 }}\n[strategy.settings]\nparticles = 20\n"
     config = load_config(config_file(f"seed = 7\n{plan}")).with_overrides(log=tmp_path / "a.mcap")
-    asks = r"4 pulses at 45, 55 % MSO.*--method curve --at 45 --at 55 --each 2 --seed 7"
+    asks = r"4 pulses at 45, 55 % MSO.*--method curve --at 45 --at 55 --each 2 --seed 7 --subject P07 --muscle FCR"
     with pytest.raises(ConfigError, match=asks):
         session_for(config)
     search = make_threshold_search("curve", space, at_pct_mso=(45.0, 55.0), each=2, seed=7)

@@ -196,6 +196,12 @@ def test_excluding_what_the_session_wanted_to_end_with_lets_it_go_on(log: Path) 
     assert read_session(log).estimates[-1].decision == result.decision
 
 
+def test_an_exclusion_afterwards_has_a_reason(log: Path) -> None:
+    session_that({}, log, trials=2).run()
+    with pytest.raises(InvalidValueError, match="needs a reason"):
+        exclude(log, 0, " ")
+
+
 def test_while_a_session_waits_another_thread_can_do_all_of_it_and_pause(log: Path) -> None:
     reasons: list[str] = []
     waiting = threading.Event()

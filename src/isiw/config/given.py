@@ -93,6 +93,8 @@ def _require_curve(config: RunConfig, searches: Sequence[ThresholdRecord]) -> No
             return
     at = [word for intensity in plan.at_pct_mso for word in ("--at", f"{intensity:g}")]
     options = ["--method", "curve", *at, "--each", plan.each, "--seed", plan.seed]
+    stated = {"--subject": config.visit.subject, "--muscle": config.visit.muscle}
+    options += [word for option, value in stated.items() if value.strip() for word in (option, value)]
     by_hand = ["--by-hand", "--high", f"{max(plan.at_pct_mso):g}"] if config.own_rig else []
     raise ConfigError(
         "the visit has pulses over the recruitment curve before the pairs, and no log of all of them is given",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import isiw
-from isiw.errors import LogError
+from isiw.errors import InvalidValueError, LogError
 from isiw.intervention import Arm
 from isiw.log.continuing import require_session
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
@@ -70,8 +70,14 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
     Raises:
         LogError: no such log, or it is still being written.
         DamagedLogError: the log's end is missing; resume the session first.
-        InvalidValueError: no such trial, or one that counts for nothing anyway.
+        InvalidValueError: no reason, no such trial, or one that counts for nothing anyway.
     """
+    if not reason.strip():
+        raise InvalidValueError(
+            "a trial that is excluded afterwards needs a reason",
+            got=reason,
+            expected='a few words for readers of the log, such as "coughed"',
+        )
     _judge(path, lambda trials, events: exclusion(trials, trial, reason, events=events))
 
 
