@@ -32,6 +32,8 @@ from isiw.subjects import SimulatedSubject
 
 RECORDED: Final = "recorded"
 COHORTS: Final = ("recruitment", "gaussian", "kim11-measured", RECORDED)
+BESIDE: Final = "nonresponder"
+"""People without a window, who are run where they are asked for."""
 MARKS: Final = (0, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60)
 TIMED: Final = 20
 """Trials of the session that processor time is measured in, at most."""
@@ -185,7 +187,7 @@ def rows_of(plan: Plan, every: Sequence[Part]) -> pd.DataFrame:
     Raises:
         SystemExit: there are none.
     """
-    read = [_read(plan.folder_of(part, cohort)) for cohort in COHORTS for part in every]
+    read = [_read(plan.folder_of(part, cohort)) for cohort in (*COHORTS, BESIDE) for part in every]
     if not (found := [table for table in read if len(table)]):
         raise SystemExit(f"{plan.folder} has no rows yet.")
     return pd.concat(found, ignore_index=True)

@@ -22,6 +22,7 @@ from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.lazy import botorch, scipy, torch
 from isiw.models.gp.places import Hyperparameters, Places, Tensor
 from isiw.models.gp.prior import ProcessSettings, Standardisation, correlations, regression
+from isiw.models.gp.weights import Weights, features, functions
 from isiw.models.shared.history import PersonTrials
 from isiw.types import FloatArray
 
@@ -148,8 +149,33 @@ class Fit:
     @cached_property
     def log_joint(self) -> Tensor:
         """Log prior and log marginal likelihood of each process, shape (q,)."""
-        log_variance = self.noise.log_variance(self.trials.isi_ms)
-        return self.log_prior + self.log_marginal(self.processes, log_variance, self.places)
+        if self.weights is not None:
+            return self.log_prior + self.weights.log_marginal
+        return self.log_prior + self.log_marginal(self.processes, self.noise.log_variance(self.trials.isi_ms))
+
+    @cached_property
+    def weights(self) -> Weights | None:
+        """What the trials say of processes that leave their constants within windows; None of others."""
+        if self.places is None:
+            return None
+        return self._weights(self.processes, self.places, self.noise.log_variance(self.trials.isi_ms))
+
+    def _weights(self, processes: Hyperparameters, places: Places, log_variance: Tensor) -> Weights:
+        trials = self.trials
+        # Where a tap changes nothing, it does not change the noise either.
+        changed = log_variance * (processes.amplitude > 0).unsqueeze(-1)
+        relative = self._relative_variance(processes, places, changed)
+        tapped = features(functions(self.settings.kernel, self.settings.windows), places, trials.isi_ms)
+        alone = tapped.new_zeros(len(tapped), len(trials.alone), tapped.shape[-1])
+        alone[..., -1] = 1.0
+        about = trials.values - places.mean(trials.isi_ms)
+        own = processes.noise.square().unsqueeze(-1)
+        return Weights(
+            features=torch.cat((tapped, alone), dim=-2),
+            values=torch.cat((about, trials.alone.expand(len(about), -1)), dim=-1),
+            variance=torch.cat((own * relative, own.expand(-1, len(trials.alone))), dim=-1),
+            level_sd=LEVEL_SD,
+        )
 
     @property
     def log_evidence(self) -> float:
@@ -168,40 +194,28 @@ class Fit:
         """The most believable process that has an amplitude."""
         return int(torch.where(self.processes.amplitude > 0, self.log_joint, -torch.inf).argmax())
 
-    def log_marginal(self, processes: Hyperparameters, log_variance: Tensor, places: Places | None = None) -> Tensor:
-        """Log marginal likelihood of the standardised trials, shape (q,); -inf where their covariance is singular."""
-        values = self._about_the_mean(places)
-        factor, failed = torch.linalg.cholesky_ex(self._covariance(processes, log_variance, places))
+    def log_marginal(self, processes: Hyperparameters, log_variance: Tensor) -> Tensor:
+        """Log marginal likelihood of the trials without windows' places, (q,); -inf where covariances are singular."""
+        values = torch.cat((self.trials.values, self.trials.alone))
+        factor, failed = torch.linalg.cholesky_ex(self._covariance(processes, log_variance))
         pivots = factor.diagonal(dim1=-2, dim2=-1)
         sound = (failed == 0) & (pivots > LEAST_PIVOT).all(-1)
         white = torch.linalg.solve_triangular(factor, values.unsqueeze(-1), upper=False).squeeze(-1)
         log_density = -0.5 * white.square().sum(-1) - pivots.log().sum(-1)
-        constant = 0.5 * values.shape[-1] * math.log(2 * math.pi)
+        constant = 0.5 * len(values) * math.log(2 * math.pi)
         return torch.where(sound, log_density - constant, -torch.inf)
 
-    def _about_the_mean(self, places: Places | None) -> Tensor:
-        """All values less the mean of each process, those of TMS alone behind the others, (n + m,) or (q, n + m)."""
-        trials = self.trials
-        if places is None:
-            return torch.cat((trials.values, trials.alone))
-        about = trials.values - places.rise.unsqueeze(-1) * places.share(trials.isi_ms)
-        return torch.cat((about, trials.alone.expand(len(about), -1)), dim=-1)
-
-    def _covariance(self, processes: Hyperparameters, log_variance: Tensor, places: Places | None = None) -> Tensor:
+    def _covariance(self, processes: Hyperparameters, log_variance: Tensor) -> Tensor:
         """Of all values, those of TMS alone behind the others, shape (q, n + m, n + m)."""
         trials = self.trials
         lengths, which = torch.unique(processes.length_ms, return_inverse=True)
         correlation = correlations(self.settings.kernel, lengths, trials.isi_ms)
         profile = processes.amplitude.square()[:, None, None] * correlation[which]
         # Where a tap changes nothing, it does not change the noise either.
-        changed = log_variance * (processes.amplitude > 0).unsqueeze(-1)
-        if places is not None:
-            share = places.share(trials.isi_ms)
-            rise = places.rise_sd.square()[:, None, None]
-            profile = (profile + rise) * share.unsqueeze(-1) * share.unsqueeze(-2)
+        relative = (log_variance * (processes.amplitude > 0).unsqueeze(-1)).exp()
         alone = len(trials.alone)
         padded = torch.nn.functional.pad(profile, (0, alone) * 2)
-        relative = torch.nn.functional.pad(self._relative_variance(processes, places, changed), (0, alone), value=1.0)
+        relative = torch.nn.functional.pad(relative, (0, alone), value=1.0)
         return LEVEL_SD**2 + padded + torch.diag_embed(processes.noise.square().unsqueeze(-1) * relative)
 
     def _relative_variance(self, processes: Hyperparameters, places: Places | None, log_variance: Tensor) -> Tensor:
@@ -216,9 +230,11 @@ class Fit:
     def surprise(self, log_variance: Tensor) -> Tensor:
         """Leave-one-out residuals of the trials with a tap under the best process [SD], shape (n,)."""
         pick = torch.tensor([self.best])
-        best, places = self.processes.picked(pick), None if self.places is None else self.places.picked(pick)
-        values = self._about_the_mean(places).flatten()
-        return leave_one_out(self._covariance(best, log_variance, places)[0], values)[: len(log_variance)]
+        best = self.processes.picked(pick)
+        if self.places is not None:
+            return self._weights(best, self.places.picked(pick), log_variance).surprise[0, : len(log_variance)]
+        values = torch.cat((self.trials.values, self.trials.alone))
+        return leave_one_out(self._covariance(best, log_variance)[0], values)[: len(log_variance)]
 
     def level(self, noise: Tensor) -> tuple[Tensor, Tensor]:
         """Mean and variance of the constant given the trials of TMS alone, of the shape of their noise SD."""

@@ -21,6 +21,7 @@ from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit
 from isiw.models.gp.places import Tensor
 from isiw.models.gp.prior import LOG_SCALE_MV, ProcessSettings, Standardisation, Transform, expected_mep_mv, scale_of
+from isiw.models.gp.weights import functions, profiles
 from isiw.models.protocol import Observation
 from isiw.models.shared.draws import systematic
 from isiw.models.shared.history import AmplitudeHistory, FloorKind, FloorTreatment, OfAmplitudes, PersonTrials
@@ -72,15 +73,15 @@ def draw_paths(found: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) 
     picks = torch.as_tensor(systematic(found.log_joint.numpy()[None], size)[0])
     chosen = found.processes.picked(picks)
     present = chosen.amplitude > 0
-    # The first of a path's numbers is its constant's, which is drawn last.
-    z = torch.as_tensor(rng.standard_normal((size, len(isi_ms) + 1))).roll(-1, dims=1)
-    drawn = torch.empty_like(z)
-    drawn[present] = _profiles(found, picks[present], isi_ms, z[present])
-    drawn[~present] = _constants(found, chosen.noise[~present], z[~present, -1]).unsqueeze(-1)
-    level, alone = drawn[:, :-1], drawn[:, -1]
     changed = found.noise.log_variance(isi_ms) * present.unsqueeze(-1)
-    if found.places is not None:
+    if found.places is None or found.weights is None:
+        level, alone = _anywhere(found, picks, isi_ms, rng)
+    else:
         places = found.places.picked(picks)
+        weights = found.weights.drawn(picks, rng)
+        alone = weights[:, -1]
+        level = profiles(functions(found.settings.kernel, found.settings.windows), places, weights, isi_ms)
+        level += alone.unsqueeze(-1)
         changed = changed + 2.0 * places.log_growth(isi_ms)
     noise_sd = chosen.noise.unsqueeze(-1) * torch.exp(0.5 * changed)
     unit, centre = found.scale.unit, found.scale.centre
@@ -95,6 +96,18 @@ def draw_paths(found: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) 
     )
 
 
+def _anywhere(found: Fit, picks: Tensor, isi_ms: Tensor, rng: np.random.Generator) -> tuple[Tensor, Tensor]:
+    """Paths of processes whose profiles may be anywhere, (s, m), and their constants (s,), standardised."""
+    chosen = found.processes.picked(picks)
+    present = chosen.amplitude > 0
+    # The first of a path's numbers is its constant's, which is drawn last.
+    z = torch.as_tensor(rng.standard_normal((len(picks), len(isi_ms) + 1))).roll(-1, dims=1)
+    drawn = torch.empty_like(z)
+    drawn[present] = _profiles(found, picks[present], isi_ms, z[present])
+    drawn[~present] = _constants(found, chosen.noise[~present], z[~present, -1]).unsqueeze(-1)
+    return drawn[:, :-1], drawn[:, -1]
+
+
 def _profiles(found: Fit, picks: Tensor, isi_ms: Tensor, z: Tensor) -> Tensor:
     """Paths of processes with an amplitude, one for each pick, then their constants, standardised, shape (s, m + 1)."""
     if not len(picks):
@@ -102,13 +115,12 @@ def _profiles(found: Fit, picks: Tensor, isi_ms: Tensor, z: Tensor) -> Tensor:
     which, member = torch.unique(picks, return_inverse=True)
     # Far from all trials a process is its constant, and a deviation that they tell nothing of.
     far_ms = isi_ms[-1:] + FAR_LENGTHS * found.processes.length_ms[which].amax()
-    deviates = 1.0 if found.places is None else 0.0
     with torch.no_grad():
         posterior: Any = found.regression(which).posterior(torch.cat((isi_ms, far_ms)).unsqueeze(-1))
         mean, covariance = posterior.mean.squeeze(-1), posterior.distribution.covariance_matrix
     surplus = torch.full_like(mean[0], PATH_JITTER)
-    # The deviation is taken away again, where there is one outside windows.
-    surplus[-1] -= deviates
+    # The deviation is taken away again.
+    surplus[-1] -= 1.0
     variance = found.processes.amplitude[which].square()
     factor = torch.linalg.cholesky(covariance + torch.diag_embed(torch.outer(variance, surplus)))
     drawn: Tensor = mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
@@ -189,8 +201,9 @@ class ProfileSample:
         step_ms = self.isi_ms[1] - self.isi_ms[0]
         position = ((isi_ms - self.isi_ms[0]) / step_ms).clamp(0.0, len(self.isi_ms) - 1.0).to(values.dtype)
         left = position.floor().long().clamp_max(len(self.isi_ms) - 2)
-        share = position - left
-        return values[..., left] * (1.0 - share) + values[..., left + 1] * share
+        # Several times as quick as indexing with brackets.
+        between: Tensor = torch.lerp(values.index_select(-1, left), values.index_select(-1, left + 1), position - left)
+        return between
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,10 @@ class Places(NamedTuple):
         steps = (isi_ms - self.middle_ms.unsqueeze(-1)) / self.sd_ms.unsqueeze(-1)
         return torch.exp(-0.5 * steps.square())
 
+    def mean(self, isi_ms: Tensor) -> Tensor:
+        """By how much each ISI [ms] (t,) lies above the constant on average, (q, t)."""
+        return self.rise.unsqueeze(-1) * self.share(isi_ms)
+
     def log_growth(self, isi_ms: Tensor) -> Tensor:
         """Log ratio of the noise SD at each ISI [ms] (t,) and outside, (q, t).
 
@@ -81,7 +85,7 @@ class Places(NamedTuple):
     def slope(self, isi_ms: Tensor) -> Tensor:
         """By how much the mean changes with each ISI [1/ms], (q, t)."""
         steps = (isi_ms - self.middle_ms.unsqueeze(-1)) / self.sd_ms.unsqueeze(-1)
-        return -self.rise.unsqueeze(-1) * self.share(isi_ms) * steps / self.sd_ms.unsqueeze(-1)
+        return -self.mean(isi_ms) * steps / self.sd_ms.unsqueeze(-1)
 
 
 @dataclass(frozen=True)
