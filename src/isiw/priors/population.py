@@ -205,8 +205,8 @@ def _picked(
 
 def _members(block: LatentBlock, law: _Normal, picks: IntArray, rng: np.random.Generator) -> FloatArray:
     """The picked particles of those who are of the lab's law in this block, shape (m, d)."""
-    rows = np.arange(len(picks))
-    picked = LatentBlock(*(part[rows, picks] for part in block))
+    at = np.arange(len(picks)), picks
+    picked = LatentBlock(block.values[at], block.log_density[at], block.used[at])
     log_odds = _log_ratio(picked, law) - np.log(P_OUTSIDER)
     members: FloatArray = picked.values[picked.used & (rng.logistic(size=len(picks)) < log_odds)]
     return members
