@@ -5,10 +5,8 @@ from __future__ import annotations
 import gc
 import os
 import sys
-from collections import Counter
 from collections.abc import Generator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -19,10 +17,6 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 # Workers and the commands that tests start would otherwise compile the modules of isiw again, each of them.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
-
-
-SLOW = 20
-"""As many usual tests take about as long as one that is marked slow."""
 
 
 @pytest.hookimpl(wrapper=True)
@@ -36,21 +30,22 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Workers take the files of most work first, so that none has one left when the others have done all theirs."""
-    if not hasattr(config, "workerinput"):
-        return
-    work = Counter[Path]()
-    for item in items:
-        work[item.path] += SLOW if item.get_closest_marker("slow") else 1
-    items.sort(key=lambda item: -work[item.path])
+APART = ("slow", "long")
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Each file is run by one worker, so that what a file's tests share is made once."""
-    from xdist.scheduler import LoadFileScheduling  # noqa: PLC0415 - whoever runs no workers need not have it
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Of slow tests, or of long ones, only files that mark one so are read: most do not, and each loads libraries."""
+    mark = config.option.markexpr
+    return True if mark in APART and collection_path.suffix == ".py" and not _marks(collection_path, mark) else None
 
-    config.option.loadscopereorder = False  # they are in order
-    return LoadFileScheduling(config, log) if config.getoption("dist") == "load" else None
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Raise if a mark is made elsewhere than in the file of its test, where it would not be looked for."""
+    marked = {(item.path, mark) for item in items for mark in APART if item.get_closest_marker(mark)}
+    if unseen := sorted(str(path) for path, mark in marked if not _marks(path, mark)):
+        raise pytest.UsageError(f"slow or long tests whose file does not have pytest.mark.slow or .long: {unseen}")
+
+
+def _marks(path: Path, mark: str) -> bool:
+    return f"pytest.mark.{mark}" in path.read_text(encoding="utf-8")

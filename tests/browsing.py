@@ -17,11 +17,8 @@ __all__ = ["IN_CHROMIUM", "broken_rules", "chromium", "hard_to_read", "screensho
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
-IN_CHROMIUM = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page in"),
-]
-"""Marks of a module of such tests."""
+IN_CHROMIUM = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page in")
+"""Of a module of such tests, which are slow ones."""
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 import pytest
-from docs.generate import api, commands, configuration, docstrings, topics
+from docs.generate import api, commands, configuration, docstrings, pages, topics
 from docs.generate.meanings import MEANINGS
 from docs.generate.places import DOCS
 from pydantic import BaseModel
@@ -86,6 +86,14 @@ def test_every_configuration_key_is_in_the_reference_with_its_meaning() -> None:
 
 def is_section(kind: Any) -> bool:
     return isinstance(kind, type) and (issubclass(kind, BaseModel) or hasattr(kind, "__dataclass_fields__"))
+
+
+def test_tutorials_are_read_far_from_each_other() -> None:
+    names = [*(f"a{number:02}" for number in range(20)), "tutorials/one", "tutorials/three", "tutorials/two", "words"]
+    before = sorted(names)
+    pages.spread(names)
+    assert sorted(names) == before
+    assert [number for number, name in enumerate(names) if name.startswith("tutorials/")] == [0, 8, 16]
 
 
 @pytest.mark.parametrize("topic", ["/header", "/intent", "/trial", "/estimate", "/event", "/threshold/pulse"])

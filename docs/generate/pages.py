@@ -22,7 +22,9 @@ _ALL = """
 def connect(app: Any) -> None:
     """Make them before Sphinx looks for pages, and put the links of all pages right when it reads them."""
     app.connect("builder-inited", lambda _: write())
+    app.connect("env-before-read-docs", lambda _app, _env, names: spread(names))
     app.connect("source-read", _read)
+    app.connect("html-page-context", _fold, priority=400)  # before the theme lists the pages
 
 
 def write() -> None:
@@ -36,6 +38,15 @@ def write() -> None:
         if not path.exists() or path.read_bytes() != content:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
+
+
+def spread(names: list[str]) -> None:
+    """Put the tutorials, which run for long, far from each other: a process reads a stretch of the pages."""
+    tutorials = [name for name in names if name.startswith("tutorials/")]
+    others = [name for name in names if name not in tutorials]
+    for number, name in enumerate(tutorials):
+        others.insert(number * (len(names) // len(tutorials)), name)
+    names[:] = others
 
 
 def made() -> Iterator[tuple[Path, bytes]]:
@@ -69,3 +80,9 @@ def _read(app: Any, docname: str, content: list[str]) -> None:
     path = Path(app.env.doc2path(docname))
     if path.suffix == ".md" and path.relative_to(DOCS).parts[0] not in MADE:
         content[0] = relinked(content[0], path, path)
+
+
+def _fold(_app: Any, _page: str, _template: str, context: dict[str, Any], _tree: object) -> None:
+    """Have a page's sidebar list the pages of its own section: all of them on all took most of the writing."""
+    if (listed := context.get("toctree")) is not None:
+        context["toctree"] = lambda **how: listed(**{**how, "collapse": True})

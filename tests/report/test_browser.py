@@ -28,7 +28,7 @@ from report.sessions import HOSTILE, tapped
 from scripted import scripted_strategy
 
 SIZE: ViewportSize = {"width": 1000, "height": 900}
-pytestmark = [*IN_CHROMIUM, pytest.mark.needs_pictures]
+pytestmark = [pytest.mark.slow, IN_CHROMIUM, pytest.mark.needs_pictures]
 
 
 @dataclass

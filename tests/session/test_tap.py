@@ -145,9 +145,15 @@ def test_a_person_whose_tap_evokes_no_response_and_who_has_no_window_gets_no_sur
     assert min(short, default=1.0) > 0.02
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("size_mv", [0.1, 0.3])
-@pytest.mark.parametrize("protocol", [VisitProtocol(), NO_TAPS])
+@pytest.mark.parametrize(
+    ("size_mv", "protocol"),
+    [
+        pytest.param(0.1, VisitProtocol(), marks=pytest.mark.slow),
+        pytest.param(0.3, NO_TAPS, marks=pytest.mark.slow),
+        pytest.param(0.3, VisitProtocol(), marks=pytest.mark.long),
+        pytest.param(0.1, NO_TAPS, marks=pytest.mark.long),
+    ],
+)
 def test_people_without_a_window_get_no_sure_one_from_a_reflex(
     tmp_path: Path, size_mv: float, protocol: VisitProtocol
 ) -> None:

@@ -12,7 +12,8 @@ import pytest
 from isiw.errors import StudyError
 from isiw.studies import DaskCluster, Failure, conduct
 from known import instance
-from studies.tiny import double, double_or_die, timeless, tiny
+from studies.tiny import timeless, tiny
+from studies.work import double, double_or_die
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_info
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.studies.execution import DaskCluster, Failure, Processes, _attempt_alone, one_thread
 from known import instance
-from studies.tiny import double, double_or_die, double_or_die_once, process_id
+from studies.work import double, double_or_die, double_or_die_once, process_id
 
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 

@@ -11,7 +11,6 @@ from typing import Any
 import pandas as pd
 import pytest
 import tomli_w
-from distributed import Client, LocalCluster
 from typer.testing import CliRunner
 
 from isiw.cli import app
@@ -171,6 +170,8 @@ def test_an_own_acquisition_function_on_a_cluster_interrupted_and_continued(tmp_
     even = {"name": "even", "settings": {"particles": 40}}
     plan, folder = written(tmp_path, even, f"{module}:acquisition", people=4), tmp_path / "own.study"
     study: Study = load_study(plan)
+    from distributed import Client, LocalCluster  # noqa: PLC0415 - it takes half a second, which others need not spend
+
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster) as client:
         with pytest.raises(KeyboardInterrupt):
             conduct(study, folder, DaskCluster(client), on_done=interrupt_after(3))

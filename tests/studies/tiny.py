@@ -1,11 +1,7 @@
-"""A study that takes a second or two, and functions that end badly."""
+"""A study that takes a second or two."""
 
 from __future__ import annotations
 
-import os
-import signal
-import time
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -40,30 +36,3 @@ def tiny(**changed: Any) -> Study:
 def timeless(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows without what differs each time."""
     return rows.drop(columns=list(TIMES))
-
-
-def double(number: int) -> int:
-    if number == 3:
-        raise ValueError("three is too many")
-    return 2 * number
-
-
-def double_or_die(number: int) -> int:
-    if number == 3:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return 2 * number
-
-
-def double_or_die_once(item: tuple[int, Path]) -> int:
-    """Dies with number 3 the first time that somebody tries."""
-    number, witness = item
-    if number == 3 and not witness.exists():
-        witness.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return 2 * number
-
-
-def process_id(_number: int) -> int:
-    """After a moment, in which another worker has something to do, too."""
-    time.sleep(0.02)
-    return os.getpid()

@@ -175,7 +175,7 @@ def learnt(
 
 
 def _log_ratio(block: LatentBlock, law: _Normal) -> FloatArray:
-    """Log density under the law over that under the prior, times the share of the lab's people, shape (n, i)."""
+    """Log density under the law over that under the prior, times the share of the lab's people, by particle."""
     mean, sd = law
     z = (block.values - mean) / sd
     log_law = -0.5 * (z**2).sum(-1) - np.log(sd).sum() - 0.5 * np.log(2 * np.pi) * len(mean)
@@ -205,10 +205,10 @@ def _picked(
 
 def _members(block: LatentBlock, law: _Normal, picks: IntArray, rng: np.random.Generator) -> FloatArray:
     """The picked particles of those who are of the lab's law in this block, shape (m, d)."""
-    rows = np.arange(len(picks))
-    log_odds = _log_ratio(block, law)[rows, picks] - np.log(P_OUTSIDER)
-    inside = block.used[rows, picks] & (rng.logistic(size=len(picks)) < log_odds)
-    members: FloatArray = block.values[rows, picks][inside]
+    at = np.arange(len(picks)), picks
+    picked = LatentBlock(block.values[at], block.log_density[at], block.used[at])
+    log_odds = _log_ratio(picked, law) - np.log(P_OUTSIDER)
+    members: FloatArray = picked.values[picked.used & (rng.logistic(size=len(picks)) < log_odds)]
     return members
 
 

@@ -12,7 +12,7 @@ from browsing import IN_CHROMIUM, broken_rules, chromium, hard_to_read, screensh
 from isiw.text.sanitize import plain
 from server.live.watched import HOSTILE, Watched
 
-pytestmark = IN_CHROMIUM
+pytestmark = [pytest.mark.slow, IN_CHROMIUM]
 TRIALS = 8
 
 

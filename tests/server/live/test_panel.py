@@ -25,7 +25,7 @@ from isiw.session.state import SENTENCES, State
 from server.live.staged import FAULT, REASON, Staged, in_state
 from server.live.watched import Watched
 
-pytestmark = IN_CHROMIUM
+pytestmark = [pytest.mark.slow, IN_CHROMIUM]
 
 STATES: Final = [state for state in State if state is not State.NOT_BEGUN]
 SIZES: Final = {1280: 900, 400: 850}
@@ -43,7 +43,7 @@ FIXED: Final = (
     "#intensity",
     "#next",
 )
-SEQUENCES: Final = int(os.environ.get("ISIW_BROWSER_SEQUENCES", "25"))
+SEQUENCES: Final = int(os.environ.get("ISIW_BROWSER_SEQUENCES", "12"))
 """How many sequences of presses are drawn in the browser; three hundred take some minutes."""
 
 
