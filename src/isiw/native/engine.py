@@ -10,19 +10,19 @@ import os
 import platform
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from isiw.errors import InvalidValueError, IsiwError
 from isiw.native.sources import digest
-from isiw.types import BoolArray, FloatArray, IntArray, Singles
+from isiw.types import BoolArray, FloatArray, Singles
 
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
 
-VERSION: Final = 7
+VERSION: Final = 8
 """Of the engine: it grows if the same draws come to other numbers."""
 
 _LONGEST: Final = 200
@@ -48,7 +48,7 @@ UNKNOWN: Final = np.float32(1e30)
 """In place of the log density of a block that was not worked out yet."""
 
 SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
-WHOLE, NATURAL, FLAG = np.dtype(np.int64), np.dtype(np.uint64), np.dtype(np.bool_)
+WHOLE, NATURAL, FLAG, PLACE = np.dtype(np.int64), np.dtype(np.uint64), np.dtype(np.bool_), np.dtype(np.int32)
 
 Seeds: TypeAlias = NDArray[np.uint64]
 
@@ -72,14 +72,16 @@ _SIGNATURES: Final = {
     "draws": "annaaa",
     "sweeps": "annnaaaaaaaa",
     "evoked_means": "nnaaa",
-    "outcome_tables": "nnnnnaaaaa",
+    "outcome_tables": "nnnnnaaaaaa",
     "rows_between": "nnnnaaaa",
     "facilitations": "nnaaa",
     "edge_levels": "nnnsaaaa",
     "window_runs": "nnaaaa",
-    "expected_f1": "nnnaaaaa",
-    "entropy_reductions": "nnnnaaaa",
-    "variance_reductions": "nnnnnaaaaa",
+    "best_window": "nnnnaaaa",
+    "reductions": "nnnnaaa",
+    "scores": "annnnnaaaa",
+    "ask": "aannnnsdnaaaaaa",
+    "estimate": "annnnaaaaaaaa",
     "elementary": "snaaa",
 }
 """The functions in the order of `Engine` in engine.h, and what they take: numbers, and arrays."""
@@ -225,23 +227,25 @@ def evoked_means(fields: Singles, rows: int) -> tuple[Singles, Singles]:
     return levels, means
 
 
-def outcome_tables(fields: Singles, levels: Singles, order: int, log_mep: Singles, widths: Singles) -> Singles:
-    """Probability of each outcome of the next trial, (b, s, l, y).
+def outcome_tables(
+    fields: Singles, levels: Singles, means: Singles, order: int, cells: Singles
+) -> tuple[Singles, Singles]:
+    """Probability of each outcome of the next trial, (b, s, l, y), and between which log MEPs they lie, (b, 2).
 
     Args:
         fields: the particles, (b, s, fields).
         levels: facilitations of the rows, (b, s, l).
+        means: expected MEPs above the floor there, in floors, likewise.
         order: how many trials came before.
-        log_mep: middles of the outcomes, log mV, (b, y).
-        widths: of the outcomes, in any unit, (y,).
+        cells: ends of the outcomes, as shares of what lies between the log MEPs, (y + 1,).
     """
-    (people, samples, rows), outcomes = levels.shape, len(widths)
-    table = np.empty((people, samples, rows, outcomes), dtype=SINGLE)
-    cells = address(log_mep, SINGLE, people, outcomes), address(widths, SINGLE, outcomes)
-    at = address(levels, SINGLE, *fields.shape[:2], rows)
-    found = address(table, SINGLE, *table.shape)
-    call("outcome_tables", people, samples, rows, outcomes, order, _fields(fields), at, *cells, found)
-    return table
+    (people, samples, rows), outcomes = levels.shape, len(cells) - 1
+    table, ends = np.empty((people, samples, rows, outcomes), dtype=SINGLE), np.empty((people, 2), dtype=SINGLE)
+    at, expected = (address(each, SINGLE, *fields.shape[:2], rows) for each in (levels, means))
+    found = address(ends, SINGLE, people, 2), address(table, SINGLE, *table.shape)
+    sizes = people, samples, rows, outcomes, order
+    call("outcome_tables", *sizes, _fields(fields), at, expected, address(cells, SINGLE, len(cells)), *found)
+    return table, ends
 
 
 def rows_between(fields: Singles, table: Singles, levels: Singles) -> Singles:
@@ -298,63 +302,34 @@ def window_runs(fields: Singles, levels: Singles, isi_ms: Singles) -> NDArray[np
     return runs
 
 
-def expected_f1(sets: BoolArray, sample: IntArray, first: IntArray, behind: IntArray) -> FloatArray:
-    """Expected F1 of sets of ISIs (c, t) with sampled windows, (c,).
+def best_window(pairs: NDArray[np.int32], points: int, shares: FloatArray) -> tuple[BoolArray, float]:
+    """The set of ISIs (t,) of largest expected F1 with sampled windows, and this F1.
 
     Args:
-        sets: which ISIs each set has.
-        sample: the sample that each run of ISIs next to each other is of, ascending, (r,).
-        first: index of its first ISI, (r,).
-        behind: index behind its last, (r,).
+        pairs: index of the first ISI of each run of a window, and behind its last, (s, k, 2).
+        points: how many ISIs.
+        shares: the sets are those in at least such a share of as many windows as any ISI is in, (cuts,).
     """
-    runs, found = len(sample), np.empty(len(sets), dtype=DOUBLE)
-    if not runs or first.min() < 0 or (first > behind).any() or behind.max() > sets.shape[1]:
+    samples, runs, _ = pairs.shape
+    if not runs or pairs.min(initial=0) < 0 or (pairs[..., 0] > pairs[..., 1]).any() or pairs.max(initial=0) > points:
         raise ValueError("windows are runs of the ISIs")
-    side_by_side = [np.ascontiguousarray(array) for array in (sample, first, behind)]
-    arrays = address(sets, FLAG, *sets.shape), *(address(array, WHOLE, runs) for array in side_by_side)
-    call("expected_f1", *sets.shape, runs, *arrays, address(found, DOUBLE, len(sets)))
-    return found
+    inside, f1 = np.empty(points, dtype=FLAG), np.empty(1, dtype=DOUBLE)
+    arrays = address(pairs, PLACE, samples, runs, 2), address(shares, DOUBLE, len(shares))
+    found = address(inside, FLAG, points), address(f1, DOUBLE, 1)
+    call("best_window", samples, runs, points, len(shares), *arrays, *found)
+    return inside, f1.item()
 
 
-class Foreseen(NamedTuple):
-    """Distributions of one person's next outcome at some ISIs: they lie between the rows of tables."""
+def reductions(mass: Singles, masks: Singles) -> Singles:
+    """Entropy of the mean of one person's distributions (s, t, y), less their mean entropy [nat], (t,).
 
-    fields: Singles  # the samples, (1, s, fields)
-    table: Singles  # distributions in the rows, (1, s, l, y)
-    levels: Singles  # facilitations at the ISIs, (1, s, t)
-
-
-def entropy_reductions(foreseen: Singles | Foreseen) -> Singles:
-    """Entropy of the mean of one person's distributions, (s, t, y) or foreseen, less their mean entropy [nat], (t,)."""
-    sizes, arrays = _foreseen(foreseen)
-    found = np.empty(sizes[2], dtype=SINGLE)
-    call("entropy_reductions", *sizes, *arrays, address(found, SINGLE, *found.shape))
-    return found
-
-
-def variance_reductions(foreseen: Singles | Foreseen, masks: Singles) -> Singles:
-    """Variance of each ISI's membership in one person's windows (s, g) less that after an outcome, summed, (t,).
-
-    Distributions of the outcome are (s, t, y), or foreseen. Sampled windows are runs of ISIs, so that what changes from
-    one ISI to the next is summed instead of all of them.
+    With windows (s, points) instead the variance of each point's membership, less that after an outcome, summed.
+    Sampled windows are runs of ISIs, so that what changes from one ISI to the next is summed instead of all of them.
     """
-    sizes, arrays = _foreseen(foreseen)
-    points, found = masks.shape[1], np.empty(sizes[2], dtype=SINGLE)
-    inside = address(masks, SINGLE, sizes[0], points)
-    call("variance_reductions", *sizes, points, *arrays, inside, address(found, SINGLE, *found.shape))
+    (samples, isis, outcomes), points, found = mass.shape, masks.shape[1], np.empty(mass.shape[1], dtype=SINGLE)
+    arrays = address(mass, SINGLE, *mass.shape), address(masks, SINGLE, samples, points), address(found, SINGLE, isis)
+    call("reductions", samples, isis, outcomes, points, *arrays)
     return found
-
-
-def _foreseen(foreseen: Singles | Foreseen) -> tuple[tuple[int, int, int, int], tuple[int, int, int]]:
-    """Samples, rows, ISIs and outcomes, and where fields, table and facilitations begin."""
-    if not isinstance(foreseen, Foreseen):
-        samples, isis, outcomes = foreseen.shape
-        mass = address(foreseen, SINGLE, *foreseen.shape)
-        return (samples, 0, isis, outcomes), (mass, mass, mass)
-    fields, table, levels = foreseen
-    (_, samples, rows, outcomes), isis = table.shape, levels.shape[2]
-    arrays = address(fields, SINGLE, 1, samples, FIELDS), address(table, SINGLE, 1, samples, _rows(rows), outcomes)
-    return (samples, rows, isis, outcomes), (*arrays, address(levels, SINGLE, 1, samples, isis))
 
 
 ELEMENTARY: Final = ("exp", "exp2", "log", "per", "per_root", "between")

@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from isiw.models.windows import CUTS, Runs
 from isiw.native.engine import (
     COLUMNS,
     DOUBLE,
@@ -17,6 +18,7 @@ from isiw.native.engine import (
     LANES,
     MEANINGS,
     NATURAL,
+    PLACE,
     SINGLE,
     UNKNOWN,
     WHOLE,
@@ -53,6 +55,14 @@ class Crowd(NamedTuple):
         return Crowd(self.values.copy(), self.kinds.copy(), log_weights, log_likelihood, self.densities.copy())
 
 
+class Asking(NamedTuple):
+    """About what ISIs are scored, and how."""
+
+    of_window: bool = False  # about the window alone
+    usual: Law | None = None  # the prior that particles are weighed by, where it is not their own
+    stronger_pct_rmt: float = 0.0  # by how much the next pulse is stronger than the pairs'
+
+
 class Tables(NamedTuple):
     """What the engine knows of a model's prior and of its moves."""
 
@@ -83,20 +93,24 @@ class Tables(NamedTuple):
     renewed: BoolArray  # which kinds each jump draws again, (jumps, kinds)
     of_profile: BoolArray  # the jump concerns nothing but a profile, which without facilitation means nothing, (jumps,)
     kinds: Array  # sums of the probabilities of earlier values of each kind, (kinds, v - 1)
+    grid_ms: Array  # ISIs of the space [ms], ascending, (t,)
+    cells: Array  # where outcomes end, as shares of the range of the log MEP, (y + 1,)
     changed: int  # block of the latent that says when something changes; that of its size is the next
+    rows: int  # of tables by facilitation
+    fine: bool  # the ISIs are so close to each other that a window's peak is in all of their range
 
 
 class _Struct(ctypes.Structure):
     """`Tables` of engine.h."""
 
     _fields_ = [
-        *((name, ctypes.c_int64) for name in ("latents", "blocks", "width", "knots", "place_count")),
-        *((name, ctypes.c_int64) for name in ("states", "part_count", "jump_count", "kind_values")),
+        *((name, ctypes.c_int64) for name in ("latents", "blocks", "width", "knots", "place_count", "states")),
+        *((name, ctypes.c_int64) for name in ("part_count", "jump_count", "kind_values", "points", "outcomes")),
         *((name, ctypes.c_void_p) for name in Tables._fields[: Tables._fields.index("place_share")]),
         ("place_share", ctypes.c_float),
         ("apart", ctypes.c_int32),
-        *((name, ctypes.c_void_p) for name in Tables._fields[Tables._fields.index("state_of") : -1]),
-        ("changed", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in Tables._fields[Tables._fields.index("state_of") : -3]),
+        *((name, ctypes.c_int64) for name in Tables._fields[-3:]),
     ]
 
 
@@ -133,6 +147,8 @@ class Law:
             "renewed": (FLAG, (jumps, KINDS)),
             "of_profile": (FLAG, (jumps,)),
             "kinds": (SINGLE, (KINDS, values)),
+            "grid_ms": (SINGLE, (len(tables.grid_ms),)),
+            "cells": (SINGLE, (len(tables.cells),)),
         }
         with np.errstate(over="ignore"):
             self._arrays = {
@@ -140,12 +156,11 @@ class Law:
             }
         sizes = {"latents": latents, "blocks": blocks, "width": width, "knots": len(knots)}
         sizes |= {"place_count": len(tables.places), "states": states, "part_count": parts, "jump_count": jumps}
+        sizes |= {"points": len(tables.grid_ms), "outcomes": len(tables.cells) - 1, "kind_values": values}
+        numbers = {name: getattr(tables, name) for name in ("place_share", "apart", "changed", "rows", "fine")}
         self._struct = _Struct(
             **sizes,
-            kind_values=values,
-            place_share=tables.place_share,
-            apart=tables.apart,
-            changed=tables.changed,
+            **numbers,
             **{name: address(self._arrays[name], dtype, *shape) for name, (dtype, shape) in shapes.items()},
         )
         self.latents, self.blocks = latents, blocks
@@ -163,6 +178,7 @@ class Law:
             within = within and 0 <= changed < self.blocks - 1 and (at[_OF_A_CHANGE] < self.latents).all()
         if self._struct.apart:
             within = within and (at[_OF_A_DEPRESSION] < self.latents).all()
+        within = within and self._struct.points > 0 and self._struct.outcomes > 0 and self._struct.rows > 1
         if not within or knots < 2 or (_LAST_KINDS @ self._arrays["state_of"]) >= self._struct.states:
             raise ValueError("the tables of a prior point beyond themselves")
 
@@ -182,13 +198,65 @@ class Law:
         """Log weights of particles under another prior, which ISIs are chosen with, (b, p)."""
         people, particles = self._require_particles(crowd.values, crowd.kinds)
         found = np.empty((people, particles), dtype=DOUBLE)
+        weights = address(crowd.log_weights, DOUBLE, people, particles), address(found, DOUBLE, people, particles)
+        arrays = *self._values(crowd.values, crowd.kinds), self._known(crowd.densities, people, particles)
+        call("usual_weights", self._at, self._other(usual), people, particles, *arrays, *weights)
+        return found
+
+    def _other(self, usual: Law) -> int:
+        """Where another prior of the same particles is."""
         if usual.latents != self.latents or usual._struct.kind_values != self._struct.kind_values:
             raise ValueError("the other prior is of other latents or kinds")
-        arrays = self._values(crowd.values, crowd.kinds)
-        known = address(crowd.densities, SINGLE, people, particles, self.blocks + 1)
-        weights = address(crowd.log_weights, DOUBLE, people, particles), address(found, DOUBLE, people, particles)
-        call("usual_weights", self._at, usual._at, people, particles, *arrays, known, *weights)
+        return usual._at
+
+    def _known(self, densities: Singles, people: int, particles: int) -> int:
+        return address(densities, SINGLE, people, particles, self.blocks + 1)
+
+    def ask(self, crowd: Crowd, isi_ms: Singles, size: int, trials: int, how: Asking) -> Singles:
+        """How much the next trial, after so many, is expected to tell at some ISIs [ms] (t,), (b, t).
+
+        Args:
+            crowd: the particles.
+            isi_ms: the ISIs.
+            size: how many particles of equal weight stand for them.
+            trials: how many came before.
+            how: about what, by which prior, and at which intensity.
+        """
+        people, particles = self._require_particles(crowd.values, crowd.kinds)
+        if not particles or not size:
+            raise ValueError("nothing stands for no particles")
+        found, isis = np.empty((people, len(isi_ms)), dtype=SINGLE), len(isi_ms)
+        known, at = self._known(crowd.densities, people, particles), address(isi_ms, SINGLE, isis)
+        weights = address(crowd.log_weights, DOUBLE, people, particles)
+        usual = None if how.usual is None else self._other(how.usual)
+        sizes = people, particles, size, trials, how.of_window, how.stronger_pct_rmt, isis
+        arrays = *self._values(crowd.values, crowd.kinds), known, weights, at, address(found, SINGLE, people, isis)
+        call("ask", self._at, usual, *sizes, *arrays)
         return found
+
+    def scores(self, fields: Singles, order: int, isi_ms: Singles, masks: Singles) -> Singles:
+        """The same by samples (b, s, fields) and windows (b, s, points); about all that is unknown without points."""
+        people, samples, points = masks.shape
+        found, isis = np.empty((people, len(isi_ms)), dtype=SINGLE), len(isi_ms)
+        given = address(fields, SINGLE, people, samples, FIELDS), address(isi_ms, SINGLE, isis)
+        more = address(masks, SINGLE, people, samples, points), address(found, SINGLE, people, isis)
+        call("scores", self._at, people, samples, order, isis, points, *given, *more)
+        return found
+
+    def estimate(self, crowd: Crowd, person: int, size: int, trials: int) -> tuple[IntArray, Runs]:
+        """Particles of equal weight that stand for one person's after so many trials: numbers (1, s), and windows."""
+        values, kinds, log_weights, *_ = (each[person : person + 1] for each in crowd)
+        people, particles = self._require_particles(values, kinds)
+        if people != 1 or not particles:
+            raise ValueError("nothing stands for no particles")
+        points, picks, runs = self._struct.points, np.empty((1, size), dtype=WHOLE), np.empty((size, 2, 2), dtype=PLACE)
+        best, f1 = np.empty(points, dtype=FLAG), np.empty(1, dtype=DOUBLE)
+        weights, cuts = address(log_weights, DOUBLE, 1, particles), address(CUTS, DOUBLE, len(CUTS))
+        found = address(picks, WHOLE, 1, size), address(runs, PLACE, size, 2, 2), address(best, FLAG, points)
+        sizes = particles, size, trials, len(CUTS)
+        given = *self._values(values, kinds), weights, cuts
+        call("estimate", self._at, *sizes, *given, *found, address(f1, DOUBLE, 1))
+        return picks, Runs(runs, points, (best, f1.item()))
 
     def learn(self, columns: Singles, min_ess: float, sweeps: tuple[int, int], dice: Seeds, crowd: Crowd) -> FloatArray:
         """Let particles learn the last of the trials, in place; what was found on the way, (b, 9).
@@ -222,7 +290,7 @@ class Law:
             *self._values(crowd.values, crowd.kinds),
             address(crowd.log_weights, DOUBLE, people, particles),
             address(crowd.log_likelihood, SINGLE, people, particles),
-            address(crowd.densities, SINGLE, people, particles, self.blocks + 1),
+            self._known(crowd.densities, people, particles),
             address(found, DOUBLE, people, 9),
         )
         return found
@@ -295,7 +363,7 @@ class Law:
             address(dice, NATURAL, people),
             *self._values(values, kinds),
             address(log_likelihood, SINGLE, people, particles),
-            address(densities, SINGLE, people, particles, self.blocks + 1),
+            self._known(densities, people, particles),
             address(counts, SINGLE, people, 4),
         )
         return counts

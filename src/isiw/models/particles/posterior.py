@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, Protocol, Self, TypeVar
@@ -15,7 +14,6 @@ from isiw.models.particles.compiled import Law
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import History, observed
-from isiw.native.engine import Foreseen
 from isiw.types import Array, FloatArray, Singles
 
 
@@ -34,7 +32,6 @@ class _Sample(Protocol):
     """What equally weighted particles say about the next MEP and about the window."""
 
     def outcome_mass(self, isi_ms: Singles) -> Singles: ...
-    def foreseen(self, isi_ms: Singles) -> Iterator[Foreseen]: ...
     def window_masks(self, isi_ms: Singles) -> Singles: ...
     def expected_mep_mv(self, isi_ms: Singles) -> Singles: ...
     def baselines_mv(self) -> Singles: ...
@@ -90,9 +87,9 @@ class SwarmPosterior(ABC, Generic[M]):
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
         return self.sample.outcome_mass(singles(isi_ms))
 
-    def foreseen(self, isi_ms: Array) -> Iterator[Foreseen]:
-        """The same, a person at a time; see `ForeseesOutcomes`."""
-        return self.sample.foreseen(singles(isi_ms))
+    @abstractmethod
+    def reductions(self, isi_ms: Array, *, of_window: bool) -> Singles:
+        """How much the next MEP is expected to tell; see `ForeseesReductions`."""
 
     def window_masks(self, isi_ms: Array) -> Singles:
         """Sampled windows; see `SamplesWindows`."""

@@ -208,8 +208,10 @@ class Prior(Checked):
 
     def hypothesis(self, latents: Latents) -> IntArray:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
-        curve = self.mixtures["recruitment"].component(latents.values[..., latents_of("recruitment")])
-        return self._hypothesis_numbers[latents.noise, curve]
+        found, curved = self._hypothesis_numbers[latents.noise, 0], latents.noise == NoiseKind.RECRUITMENT
+        curve = self.mixtures["recruitment"].component(latents.values[curved][:, latents_of("recruitment")])
+        found[curved] = self._hypothesis_numbers[NoiseKind.RECRUITMENT, curve]
+        return found
 
     def unusual(self, latents: Latents, space: DesignSpace) -> dict[str, float]:
         """How probable it is that parts of a person are of another law than the usual one, by what they are called."""

@@ -42,22 +42,6 @@ INLINE void added(float factor, const float *values, int64_t count, float *to) {
         stored(loaded(to + i, count - i) + factor * loaded(values + i, count - i), to + i, count - i);
 }
 
-static int entropy_reductions(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,
-                              const float *table, const float *levels, float *found) {
-    Foreseen of = {samples, rows, isis, outcomes, fields, table, levels};
-    float *mass = malloc((size_t)((samples + 1) * outcomes + 1) * sizeof *mass), share = 1.0f / (float)samples;
-    if (!mass) return -1;
-    float *mean = mass + samples * outcomes;
-    for (int64_t t = 0; t < isis; t++) {
-        foreseen_at(&of, t, mass);
-        memset(mean, 0, (size_t)outcomes * sizeof *mean);
-        for (int64_t s = 0; s < samples; s++) added(share, mass + s * outcomes, outcomes, mean);
-        found[t] = share * negative_entropy(mass, samples * outcomes) - negative_entropy(mean, outcomes);
-    }
-    free(mass);
-    return 0;
-}
-
 /* Where a sampled window begins or ends. */
 typedef struct {
     int64_t sample, at;
@@ -103,23 +87,36 @@ static float explained(const float *mass, int64_t samples, int64_t outcomes, con
     return lanes_sum(found) / (float)samples;
 }
 
-static int variance_reductions(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, int64_t points,
-                               const float *fields, const float *table, const float *levels, const float *masks,
-                               float *found) {
-    Foreseen of = {samples, rows, isis, outcomes, fields, table, levels};
+/* Entropy of the mean of distributions less their mean entropy at each ISI; or, with windows (s, points), the variance
+of each point's membership less that expected after an outcome, summed. */
+static int reductions_of(const Foreseen *of, int64_t points, const float *masks, float *found) {
+    int64_t samples = of->samples, outcomes = of->outcomes, count = 0;
     Change *changes = malloc((size_t)(samples * points + 1) * sizeof *changes);
     float *room = malloc((size_t)(points + (points + samples + 1) * outcomes + 1) * sizeof *room);
     int there = changes && room;
     if (there) {
         float *mean = room, *all_of = room + points, *mass = all_of + outcomes, *steps = mass + samples * outcomes;
-        int64_t count = changes_of(masks, samples, points, changes, mean);
-        for (int64_t t = 0; t < isis; t++) {
-            foreseen_at(&of, t, mass);
-            found[t] = explained(mass, samples, outcomes, changes, count, mean, points, steps, all_of);
+        float share = 1.0f / (float)samples;
+        if (points) count = changes_of(masks, samples, points, changes, mean);
+        for (int64_t t = 0; t < of->isis; t++) {
+            foreseen_at(of, t, mass);
+            if (points) {
+                found[t] = explained(mass, samples, outcomes, changes, count, mean, points, steps, all_of);
+                continue;
+            }
+            memset(all_of, 0, (size_t)outcomes * sizeof *all_of);
+            for (int64_t s = 0; s < samples; s++) added(share, mass + s * outcomes, outcomes, all_of);
+            found[t] = share * negative_entropy(mass, samples * outcomes) - negative_entropy(all_of, outcomes);
         }
     }
     free(changes), free(room);
     return there ? 0 : -1;
+}
+
+static int reductions(int64_t samples, int64_t isis, int64_t outcomes, int64_t points, const float *mass,
+                      const float *masks, float *found) {
+    Foreseen of = {samples, 0, isis, outcomes, NULL, mass, NULL};
+    return reductions_of(&of, points, masks, found);
 }
 
 #endif

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Annotated
 
+import numpy as np
+
 from isiw.checks import MOST_OF_A_KIND, Checked, SmallestAmplitude, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
@@ -19,8 +21,9 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation
-from isiw.models.windows import Runs, SampledProfiles, best_window, grid_of, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, grid_of, profile_grid, sampled_estimate
 from isiw.types import Array, Singles
+from isiw.window import Window
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,14 @@ class SupraPosterior(SwarmPosterior[SupraModel]):
     def _sample(self, size: int, order: int) -> SupraSample:
         return SupraSample(self.swarm.picked(self.law, size)[1], self.space, order)
 
+    def reductions(self, isi_ms: Array, *, of_window: bool) -> Singles:
+        """How much the next MEP is expected to tell; see `ForeseesReductions`."""
+        sample, at_ms = self.sample, singles(isi_ms)
+        masks = np.empty((*sample.fields.shape[:2], 0), dtype=np.float32)
+        if of_window:
+            masks = np.concatenate((sample.window_masks(at_ms), sample.depressed_masks(at_ms)), axis=-1)
+        return self.law.scores(sample.fields, self.trials, at_ms, masks)
+
     def depressed_masks(self, isi_ms: Array) -> Singles:
         """Sampled depressed segments; see `SamplesDepression`."""
         return self.sample.depressed_masks(singles(isi_ms))
@@ -85,6 +96,6 @@ class SupraPosterior(SwarmPosterior[SupraModel]):
             Runs.of_masks(masks(grid)[person]) for masks in (self._all.window_masks, self._all.depressed_masks)
         )
         estimate = sampled_estimate(enhanced, profiles, self.space)
-        probability = len(depressed.found) / depressed.samples
-        segment = best_window(depressed, self.space.grid_ms)[0] if probability >= 0.5 else None
+        probability = len(depressed.found) / len(depressed.pairs)
+        segment = Window.from_mask(self.space.grid_ms, depressed.best[0]) if probability >= 0.5 else None
         return estimate.noting(depressed=segment, depressed_probability=probability)
