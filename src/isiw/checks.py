@@ -221,8 +221,14 @@ Flag: TypeAlias = Annotated[bool, flag]
 
 
 def can(value: object, capability: Callable[..., _T]) -> TypeGuard[_T]:
-    """True if a value has all that a protocol names: `isinstance`, which collects the names whenever it is asked."""
-    return all(hasattr(value, name) for name in _names(capability))
+    """True if a value has all that a protocol names: `isinstance`, which works properties out whenever it is asked."""
+    return _all_can(type(value), capability) or all(hasattr(value, name) for name in _names(capability))
+
+
+@cache
+def _all_can(kind: type, capability: Any) -> bool:
+    """Whether all values of a type have what a protocol names."""
+    return all(hasattr(kind, name) for name in _names(capability))
 
 
 @cache

@@ -171,7 +171,7 @@ def test_what_a_posterior_foresees_by_itself_is_scored_as_its_distributions(
     posterior = posterior.at_intensity(10.0).posterior if which == "at an intensity" else posterior
     given: Any = SimpleNamespace(outcome_mass=posterior.outcome_mass, window_masks=posterior.window_masks)
     isi_ms = VALVE_SPACE.grid_ms[::9]
-    assert score(posterior, isi_ms) == pytest.approx(score(given, isi_ms), rel=1e-5)
+    assert score(posterior, isi_ms) == pytest.approx(score(given, isi_ms), rel=2e-5)
 
 
 def test_what_a_posterior_with_a_depression_foresees_by_itself_is_scored_as_its_distributions() -> None:
@@ -181,7 +181,7 @@ def test_what_a_posterior_with_a_depression_foresees_by_itself_is_scored_as_its_
     given: Any = SimpleNamespace(**{name: getattr(posterior, name) for name in names})
     isi_ms = VALVE_SPACE.grid_ms[::9]
     for score in (MutualInformation(), WindowGain()):
-        assert score(posterior, isi_ms) == pytest.approx(score(given, isi_ms), rel=1e-5)
+        assert score(posterior, isi_ms) == pytest.approx(score(given, isi_ms), rel=2e-5)
 
 
 def test_the_window_can_be_asked_for_only_where_windows_are_sampled() -> None:

@@ -113,7 +113,7 @@ class Swarm:
         equal = np.full((people, particles), -math.log(particles))
         nothing = np.zeros((people, particles), dtype=np.float32)
         crowd = Crowd(values, kinds, equal, nothing, law.nothing_known(people, particles))
-        return cls(crowd, np.zeros(people), History.empty(people), Bets.none(people))
+        return cls(crowd, np.zeros(people), History.empty(people), Bets())
 
     @property
     def latents(self) -> Latents:

@@ -94,8 +94,8 @@ typedef struct {
     /* Windows as two runs of indices of ISIs: first, behind the last, (b, s, 4). */
     int (*window_runs)(int64_t samples, int64_t isis, const float *fields, const float *levels, const float *isi_ms,
                        int32_t *runs);
-    /* Of windows as so many runs (s, runs, 2): the set of ISIs (t,) of largest expected F1 among those in at least a share
-    of as many windows as any is in, by shares (cuts,), and this F1. */
+    /* Of windows as so many runs (s, runs, 2): the set of ISIs (t,) of largest expected F1 among those in at least a
+    share of as many windows as any is in, by shares (cuts,), and this F1. */
     int (*best_window)(int64_t samples, int64_t most_runs, int64_t isis, int64_t cuts, const int32_t *runs,
                        const double *shares, uint8_t *inside, double *f1);
     /* Entropy of the mean of distributions (s, t, y), less their mean entropy, (t,); or, with windows (s, points), the
@@ -111,7 +111,7 @@ typedef struct {
                int64_t trials, int32_t of_window, double stronger, int64_t isis, const float *values,
                const int64_t *kinds, const float *densities, const double *log_weights, const float *isi_ms,
                float *found);
-    /* One person's window: the particles that represent all (s,), their windows as runs (s, 4), and as `best_window`. */
+    /* One person's window: the particles that represent all (s,), their windows as runs (s, 4); and `best_window`. */
     int (*estimate)(const Tables *tables, int64_t particles, int64_t size, int64_t trials, int64_t cuts,
                     const float *values, const int64_t *kinds, const double *log_weights, const double *shares,
                     int64_t *picks, int32_t *runs, uint8_t *inside, double *f1);
