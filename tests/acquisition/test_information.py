@@ -30,7 +30,6 @@ from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.models.particles import ParticleModel
-from isiw.models.particles.supra import SupraModel
 from isiw.models.protocol import Observation, Posterior, PredictsOutcomes, SamplesWindows
 from isiw.types import Array
 
@@ -172,16 +171,6 @@ def test_what_a_posterior_foresees_by_itself_is_scored_as_its_distributions(
     given: Any = SimpleNamespace(outcome_mass=posterior.outcome_mass, window_masks=posterior.window_masks)
     isi_ms = VALVE_SPACE.grid_ms[::9]
     assert score(posterior, isi_ms) == pytest.approx(score(given, isi_ms), rel=2e-5)
-
-
-def test_what_a_posterior_with_a_depression_foresees_by_itself_is_scored_as_its_distributions() -> None:
-    model = SupraModel(particles=100, thinned=30)
-    posterior = model.update(model.begin(VALVE_SPACE, 0, people=2), Observation.of([60.0, 90.0], [0.3, 0.05]))
-    names = ("outcome_mass", "window_masks", "depressed_masks")
-    given: Any = SimpleNamespace(**{name: getattr(posterior, name) for name in names})
-    isi_ms = VALVE_SPACE.grid_ms[::9]
-    for score in (MutualInformation(), WindowGain()):
-        assert score(posterior, isi_ms) == pytest.approx(score(given, isi_ms), rel=2e-5)
 
 
 def test_the_window_can_be_asked_for_only_where_windows_are_sampled() -> None:

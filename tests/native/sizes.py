@@ -26,7 +26,7 @@ from isiw.models.shared.history import Circumstances, History, neutral
 from isiw.models.shared.scales import Scale
 from isiw.models.windows import Runs, grid_of
 from isiw.native.engine import log_likelihoods, reductions
-from native.drawn import Case, seeds
+from native.drawn import Case, seeds, sweeps
 
 TRIALS = (0, 1, 2, 7, 8, 9, 15, 16, 17, 63, 64, 65, 127, 128, 129, 257)
 PARTICLES = (2, 3, 15, 16, 17, 65)
@@ -57,7 +57,7 @@ def computed(case: Case, particles: int, told: History) -> Latents:
     law, drawn, dice = case.law, case.drawn(particles, particles), seeds(particles)
     equal, nothing = np.full((1, particles), -np.log(particles)), law.nothing_known(1, particles)
     state = *drawn, log_likelihoods(case.fields(drawn), told.columns), nothing
-    law.sweeps(np.array([2]), told.columns, dice, state)
+    sweeps(law, np.array([2]), told.columns, dice, state)
     crowd = Crowd(*drawn, equal, *state[2:])
     if told.trials:
         for min_ess in (0.0, 1.0):  # kept, and resampled
@@ -80,7 +80,6 @@ def predicted(case: Case, latents: Latents) -> None:
     for points in (0, 1, len(isi_ms)):
         inside = masks[..., :points].copy()
         reductions(mass[0], inside[0])
-        case.law.scores(sample.fields, 1, isi_ms, inside)
     sample.expected_mep_mv(isi_ms)
     best, _ = Runs.of_masks(masks[0]).best
     assert len(best) == len(isi_ms)

@@ -24,7 +24,7 @@ from isiw.models.shared.history import Circumstances
 from isiw.native import engine
 from isiw.native.engine import COLUMNS, FIELDS, UNKNOWN, log_likelihoods
 from native import reference
-from native.drawn import CASES, PLACES, Case, columns, seeds, trials
+from native.drawn import CASES, PLACES, Case, columns, seeds, sweeps, trials
 
 ORDERS = (0, 1, 12)
 FEW_MS = np.array([0.0, 40.0, 90.0, 180.0, 233.0, 260.0, 300.0, np.nan], dtype=np.float32)
@@ -78,7 +78,7 @@ def test_tables_of_predictions_are_those_of_the_reference(name: str, order: int)
     evoked = [[reference.expected_evoked(one, order, at) for at in own] for one, own in both]
     np.testing.assert_allclose(means[0], evoked, rtol=3e-4, atol=1e-4)
     cells = np.sort(rng.random(outcomes + 1)).astype(np.float32)
-    (found,), ((low, high),) = engine.outcome_tables(fields, rows, means, order, cells)
+    ((low, high),), (found,) = engine.outcome_tables(fields, rows, means, order, cells)
     log_mep, widths = low + (high - low) * 0.5 * (cells[1:] + cells[:-1]).astype(float), np.diff(cells.astype(float))
     for one, own, masses in zip(particles, levels, found, strict=True):
         for row in (0, 5, LEVELS - 1):
@@ -173,7 +173,7 @@ def test_densities_of_the_priors_blocks_are_those_of_the_reference(name: str) ->
     drawn = case.of_all_kinds(120, 9)
     law, state = case.law, (drawn.values, drawn.kinds, np.zeros((1, 120), dtype=np.float32))
     kept = law.nothing_known(1, 120)
-    law.sweeps(np.array([4]), np.zeros((1, 0, COLUMNS), dtype=np.float32), seeds(9), (*state, kept))
+    sweeps(law, np.array([4]), np.zeros((1, 0, COLUMNS), dtype=np.float32), seeds(9), (*state, kept))
     found = case.prior.log_densities(drawn.values, case.space)
     for block, block_name in enumerate(found):
         place = block_name == "place"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import os
 import platform
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -51,6 +52,7 @@ SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
 WHOLE, NATURAL, FLAG, PLACE = np.dtype(np.int64), np.dtype(np.uint64), np.dtype(np.bool_), np.dtype(np.int32)
 
 Seeds: TypeAlias = NDArray[np.uint64]
+_Shape: TypeAlias = tuple[int, ...]
 
 
 _FILES: Final = {"Darwin": "_engine.dylib", "Windows": "_engine.dll"}
@@ -79,7 +81,6 @@ _SIGNATURES: Final = {
     "window_runs": "nnaaaa",
     "best_window": "nnnnaaaa",
     "reductions": "nnnnaaa",
-    "scores": "annnnnaaaa",
     "ask": "aannnnsdnaaaaaa",
     "estimate": "annnnaaaaaaaa",
     "elementary": "snaaa",
@@ -207,12 +208,19 @@ def require_built_of(library: ctypes.CDLL, folder: Path) -> None:
         )
 
 
+def _made(name: str, sizes: Sequence[int], given: Sequence[tuple[Singles, _Shape]], *shapes: _Shape) -> Any:
+    """What a function makes of sizes and of arrays, which must have some shapes: arrays of some shapes, or the one."""
+    found = [np.empty(shape, dtype=SINGLE) for shape in shapes]
+    arrays = (*given, *zip(found, shapes, strict=True))
+    call(name, *sizes, *(address(array, SINGLE, *shape) for array, shape in arrays))
+    return found[0] if len(found) == 1 else tuple(found)
+
+
 def log_likelihoods(fields: Singles, columns: Singles) -> Singles:
     """Log likelihood of each person's trials (b, n, columns) under each particle (b, p, fields), (b, p)."""
     (people, particles, _), trials = fields.shape, columns.shape[1]
-    found = np.empty((people, particles), dtype=SINGLE)
-    told = address(columns, SINGLE, people, trials, COLUMNS)
-    call("likelihoods", people, particles, trials, _fields(fields), told, address(found, SINGLE, *found.shape))
+    given = _fields(fields), (columns, (people, trials, COLUMNS))
+    found: Singles = _made("likelihoods", (people, particles, trials), given, (people, particles))
     return found
 
 
@@ -221,16 +229,15 @@ def evoked_means(fields: Singles, rows: int) -> tuple[Singles, Singles]:
 
     Rows are at squares of equal steps, or where there is a depression at equal steps from below 0.
     """
-    levels, means = (np.empty((*fields.shape[:2], _rows(rows)), dtype=SINGLE) for _ in range(2))
-    arrays = address(levels, SINGLE, *levels.shape), address(means, SINGLE, *means.shape)
-    call("evoked_means", _samples(fields), rows, _fields(fields), *arrays)
-    return levels, means
+    shape = *fields.shape[:2], _rows(rows)
+    found: tuple[Singles, Singles] = _made("evoked_means", (_samples(fields), rows), [_fields(fields)], shape, shape)
+    return found
 
 
 def outcome_tables(
     fields: Singles, levels: Singles, means: Singles, order: int, cells: Singles
 ) -> tuple[Singles, Singles]:
-    """Probability of each outcome of the next trial, (b, s, l, y), and between which log MEPs they lie, (b, 2).
+    """Between which log MEPs outcomes of the next trial lie, (b, 2), and the probability of each, (b, s, l, y).
 
     Args:
         fields: the particles, (b, s, fields).
@@ -239,39 +246,26 @@ def outcome_tables(
         order: how many trials came before.
         cells: ends of the outcomes, as shares of what lies between the log MEPs, (y + 1,).
     """
-    (people, samples, rows), outcomes = levels.shape, len(cells) - 1
-    table, ends = np.empty((people, samples, rows, outcomes), dtype=SINGLE), np.empty((people, 2), dtype=SINGLE)
-    at, expected = (address(each, SINGLE, *fields.shape[:2], rows) for each in (levels, means))
-    found = address(ends, SINGLE, people, 2), address(table, SINGLE, *table.shape)
-    sizes = people, samples, rows, outcomes, order
-    call("outcome_tables", *sizes, _fields(fields), at, expected, address(cells, SINGLE, len(cells)), *found)
-    return table, ends
+    of, outcomes = fields.shape[:2], len(cells) - 1
+    rows = *of, levels.shape[2]
+    given = _fields(fields), (levels, rows), (means, rows), (cells, (outcomes + 1,))
+    sizes = *rows, outcomes, order
+    found: tuple[Singles, Singles] = _made("outcome_tables", sizes, given, (of[0], 2), (*rows, outcomes))
+    return found
 
 
 def rows_between(fields: Singles, table: Singles, levels: Singles) -> Singles:
     """What lies between the rows of tables (b, s, l, y) at facilitations (b, s, t), (b, s, t, y)."""
-    rows, outcomes, isis = table.shape[2], table.shape[3], levels.shape[2]
-    found = np.empty((*levels.shape, outcomes), dtype=SINGLE)
-    of = fields.shape[:2]
-    arrays = address(table, SINGLE, *of, _rows(rows), outcomes), address(levels, SINGLE, *of, isis)
-    call(
-        "rows_between",
-        _samples(fields),
-        rows,
-        isis,
-        outcomes,
-        _fields(fields),
-        *arrays,
-        address(found, SINGLE, *found.shape),
-    )
+    of, (rows, outcomes), isis = fields.shape[:2], table.shape[2:], levels.shape[2]
+    given = _fields(fields), (table, (*of, _rows(rows), outcomes)), (levels, (*of, isis))
+    found: Singles = _made("rows_between", (_samples(fields), rows, isis, outcomes), given, (*of, isis, outcomes))
     return found
 
 
 def facilitations(fields: Singles, isi_ms: Singles) -> Singles:
     """Facilitation of each particle at some ISIs [ms] (t,), (b, s, t)."""
-    found = np.empty((*fields.shape[:2], len(isi_ms)), dtype=SINGLE)
-    at = address(isi_ms, SINGLE, len(isi_ms))
-    call("facilitations", _samples(fields), len(isi_ms), _fields(fields), at, address(found, SINGLE, *found.shape))
+    given, isis = (_fields(fields), (isi_ms, (len(isi_ms),))), len(isi_ms)
+    found: Singles = _made("facilitations", (_samples(fields), isis), given, (*fields.shape[:2], isis))
     return found
 
 
@@ -284,21 +278,20 @@ def edge_levels(fields: Singles, evoked: Singles, isi_ms: Singles, *, fine: bool
         isi_ms: ascending ISIs [ms], (t,).
         fine: whether the largest facilitation is that of all of their range, not of these ISIs alone.
     """
-    rows, found = evoked.shape[2], np.empty(fields.shape[:2], dtype=SINGLE)
-    if not len(isi_ms):
+    of, rows, isis = fields.shape[:2], evoked.shape[2], len(isi_ms)
+    if not isis:
         raise ValueError("windows are looked for at some ISIs")
-    arrays = address(evoked, SINGLE, *fields.shape[:2], _rows(rows)), address(isi_ms, SINGLE, len(isi_ms))
-    at = address(found, SINGLE, *found.shape)
-    call("edge_levels", _samples(fields), rows, len(isi_ms), fine, _fields(fields), *arrays, at)
+    given = _fields(fields), (evoked, (*of, _rows(rows))), (isi_ms, (isis,))
+    found: Singles = _made("edge_levels", (_samples(fields), rows, isis, fine), given, of)
     return found
 
 
 def window_runs(fields: Singles, levels: Singles, isi_ms: Singles) -> NDArray[np.int32]:
     """Which ISIs are in each particle's window, as two runs of indices (first, behind the last), (b, s, 4) int32."""
-    runs = np.empty((*levels.shape, 4), dtype=np.int32)
+    runs = np.empty((*levels.shape, 4), dtype=PLACE)
     arrays = address(levels, SINGLE, *fields.shape[:2]), address(isi_ms, SINGLE, len(isi_ms))
-    at = address(runs, runs.dtype, *runs.shape)
-    call("window_runs", _samples(fields), len(isi_ms), _fields(fields), *arrays, at)
+    of, at = address(fields, SINGLE, *fields.shape[:2], FIELDS), address(runs, PLACE, *runs.shape)
+    call("window_runs", _samples(fields), len(isi_ms), of, *arrays, at)
     return runs
 
 
@@ -326,28 +319,14 @@ def reductions(mass: Singles, masks: Singles) -> Singles:
     With windows (s, points) instead the variance of each point's membership, less that after an outcome, summed.
     Sampled windows are runs of ISIs, so that what changes from one ISI to the next is summed instead of all of them.
     """
-    (samples, isis, outcomes), points, found = mass.shape, masks.shape[1], np.empty(mass.shape[1], dtype=SINGLE)
-    arrays = address(mass, SINGLE, *mass.shape), address(masks, SINGLE, samples, points), address(found, SINGLE, isis)
-    call("reductions", samples, isis, outcomes, points, *arrays)
+    (samples, isis, outcomes), points = mass.shape, masks.shape[1]
+    given = (mass, mass.shape), (masks, (samples, points))
+    found: Singles = _made("reductions", (samples, isis, outcomes, points), given, (isis,))
     return found
 
 
-ELEMENTARY: Final = ("exp", "exp2", "log", "per", "per_root", "between")
-
-
-def elementary(name: str, x: Singles, y: Singles | None = None) -> Singles:
-    """One of the elementary functions that the engine is made of, of some numbers (n,); for tests.
-
-    `between` is the probability that a standard normal variable is between x and y.
-    """
-    found = np.empty(len(x), dtype=SINGLE)
-    arrays = (address(array, SINGLE, len(x)) for array in (x, x if y is None else y, found))
-    call("elementary", ELEMENTARY.index(name), len(x), *arrays)
-    return found
-
-
-def _fields(fields: Singles) -> int:
-    return address(fields, SINGLE, *fields.shape[:2], FIELDS)
+def _fields(fields: Singles) -> tuple[Singles, _Shape]:
+    return fields, (*fields.shape[:2], FIELDS)
 
 
 def _samples(fields: Singles) -> int:

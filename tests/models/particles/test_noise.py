@@ -162,7 +162,7 @@ def test_the_density_integrates_to_one(modelled: Singles, level: float) -> None:
 def test_the_density_of_a_trial_is_that_of_the_outcome_in_a_table(modelled: Singles) -> None:
     cells = np.array([0.0, 0.2, 0.4, 0.6, 0.8], dtype=np.float32)
     levels, means = engine.evoked_means(modelled, LEVELS)
-    tables, ends = engine.outcome_tables(modelled, levels, means, LATER, cells)
+    ends, tables = engine.outcome_tables(modelled, levels, means, LATER, cells)
     (low, high), table = ends[0].astype(float).tolist(), tables[0, 0]
     log_mep = low + 0.5 * (cells[1:] + cells[:-1]) * (high - low)
     for row in (1, 9, LEVELS - 1):

@@ -87,7 +87,7 @@ def test_outcomes_reach_from_below_the_floor_to_above_the_largest_meps(samples: 
     log_floor, evoked = fields[..., LOG_FLOOR], engine.evoked_means(fields, LEVELS)[1]
     low = np.quantile(log_floor, 0.05, axis=-1) - 1.0
     high = np.quantile(log_floor + np.log1p(evoked.max(-1)), 0.95, axis=-1) + 1.5
-    np.testing.assert_allclose(PersonSample(fields, VALVE_SPACE).outcomes[1], np.stack((low, high), axis=-1), rtol=1e-5)
+    np.testing.assert_allclose(PersonSample(fields, VALVE_SPACE).outcomes[0], np.stack((low, high), axis=-1), rtol=1e-5)
 
 
 def test_meps_are_drawn_as_often_below_a_quantile_as_it_says() -> None:

@@ -234,15 +234,6 @@ class Law:
         call("ask", self._at, usual, *sizes, *arrays)
         return found
 
-    def scores(self, fields: Singles, order: int, isi_ms: Singles, masks: Singles) -> Singles:
-        """The same by samples (b, s, fields) and windows (b, s, points); about all that is unknown without points."""
-        people, samples, points = masks.shape
-        found, isis = np.empty((people, len(isi_ms)), dtype=SINGLE), len(isi_ms)
-        given = address(fields, SINGLE, people, samples, FIELDS), address(isi_ms, SINGLE, isis)
-        more = address(masks, SINGLE, people, samples, points), address(found, SINGLE, people, isis)
-        call("scores", self._at, people, samples, order, isis, points, *given, *more)
-        return found
-
     def estimate(self, crowd: Crowd, person: int, size: int, trials: int) -> tuple[IntArray, Runs]:
         """Particles of equal weight that stand for one person's after so many trials: numbers (1, s), and windows."""
         values, kinds, log_weights, *_ = (each[person : person + 1] for each in crowd)
@@ -328,45 +319,6 @@ class Law:
         arrays = self._values(values, kinds)
         call("draws", self._at, people, particles, address(seeds, NATURAL, people), *arrays)
         return values, kinds
-
-    def sweeps(
-        self,
-        numbers: IntArray,
-        columns: Singles,
-        dice: Seeds,
-        state: tuple[Singles, IntArray, Singles, Singles],
-    ) -> Singles:
-        """Move each person's particles so many times (b,), in place; the counts of their moves, (b, 4).
-
-        Args:
-            numbers: how often each person's particles move, (b,).
-            columns: the trials, (b, n, columns).
-            dice: seeds, which move on, (b,) whole numbers of 64 bits without a sign.
-            state: latents, kinds, log likelihood and log densities of blocks of the particles, which change.
-
-        Returns:
-            Shifts, those that were accepted, jumps, and those that were accepted, (b, 4).
-        """
-        values, kinds, log_likelihood, densities = state
-        people, particles = self._require_particles(values, kinds)
-        trials, counts = columns.shape[1], np.zeros((people, 4), dtype=SINGLE)
-        if particles < 2:
-            raise ValueError("particles move by differences of others")
-        call(
-            "sweeps",
-            self._at,
-            people,
-            particles,
-            trials,
-            address(numbers, WHOLE, people),
-            address(columns, SINGLE, people, trials, COLUMNS),
-            address(dice, NATURAL, people),
-            *self._values(values, kinds),
-            address(log_likelihood, SINGLE, people, particles),
-            self._known(densities, people, particles),
-            address(counts, SINGLE, people, 4),
-        )
-        return counts
 
     def _require_particles(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
         people, particles, latents = values.shape

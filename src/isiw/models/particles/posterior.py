@@ -87,10 +87,6 @@ class SwarmPosterior(ABC, Generic[M]):
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
         return self.sample.outcome_mass(singles(isi_ms))
 
-    @abstractmethod
-    def reductions(self, isi_ms: Array, *, of_window: bool) -> Singles:
-        """How much the next MEP is expected to tell; see `ForeseesReductions`."""
-
     def window_masks(self, isi_ms: Array) -> Singles:
         """Sampled windows; see `SamplesWindows`."""
         return self.sample.window_masks(singles(isi_ms))

@@ -46,7 +46,7 @@ class TabledSample:
     def outcome_mass(self, isi_ms: Singles) -> Singles:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
         one = self.at_the_next
-        return engine.rows_between(one.fields, one.outcomes[0], engine.facilitations(one.fields, isi_ms))
+        return engine.rows_between(one.fields, one.outcomes[1], engine.facilitations(one.fields, isi_ms))
 
     def mep_quantiles_mv(self, isi_ms: Singles, shares: FloatArray) -> FloatArray:
         """Quantiles of the next MEP [mV], shape (b, t, q)."""
@@ -56,7 +56,7 @@ class TabledSample:
         before, behind = (np.take_along_axis(below, at, axis=-1) for at in (cell, cell + 1))
         within = np.clip((shares - before) / np.maximum(behind - before, np.finfo(float).tiny), 0.0, 1.0)
         ends = CELLS[cell] + within * (CELLS[cell + 1] - CELLS[cell])
-        low, high = (end[:, np.newaxis, np.newaxis] for end in self.outcomes[1].T)
+        low, high = (end[:, np.newaxis, np.newaxis] for end in self.outcomes[0].T)
         quantiles_mv: FloatArray = np.exp(low + ends * (high - low))
         return quantiles_mv
 
@@ -93,7 +93,7 @@ class TabledSample:
 
     @cached_property
     def outcomes(self) -> tuple[Singles, Singles]:
-        """Probability of each outcome of the next trial in each row, (b, s, l, y); their range in log MEPs, (b, 2)."""
+        """Between which log MEPs outcomes of the next trial lie, (b, 2), and the probability of each, (b, s, l, y)."""
         return engine.outcome_tables(self.fields, *self._rows, self.order, CELLS)
 
 

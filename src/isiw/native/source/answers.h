@@ -7,6 +7,8 @@
 #include "learning.h"
 #include "windows.h"
 
+#define LEAST_LEVEL 1e-10f /* a smaller facilitation is none: 2e-4 of the way to the next of 24 rows */
+
 /* Windows of particles on the grid of a space, at some ISIs of its range, as runs of indices, (s, 4). */
 static int windows_of(const Tables *tables, int64_t samples, const float *fields, const float *means, int64_t isis,
                       const float *isi_ms, float *levels, int32_t *runs) {
@@ -15,18 +17,16 @@ static int windows_of(const Tables *tables, int64_t samples, const float *fields
     return failed ? failed : window_runs(samples, isis, fields, levels, isi_ms, runs);
 }
 
-#define LEAST_LEVEL 1e-10f /* a smaller facilitation is none: 2e-4 of the way to the next of 24 rows */
-
-/* Add what a sample foresees at some ISIs to all sums; its table has the rows between which that lies. */
+/* Add a sample's window, and what it foresees at some ISIs, to sums; its table has the rows between which that lies. */
 static void foresee(Sums *sums, const Tables *tables, const float *fields, int64_t order, const float *levels,
-                    const float *cells, const float *isi_ms, const float *window, float *room) {
-    int64_t rows = tables->rows, outcomes = tables->outcomes, from = sums->isis, to = 0;
+                    const float *cells, const float *isi_ms, const int32_t *runs, float *room) {
+    int64_t rows = tables->rows, outcomes = tables->outcomes, isis = sums->isis, from = isis, to = 0;
     float *table = room + 2 * NODES * rows, *rest = table + rows * outcomes, *at = rest + outcomes;
-    float *mass = at + sums->isis, depth = fields[DEPTH];
-    uint8_t *needed = (uint8_t *)(mass + sums->isis * outcomes);
-    facilitations_at(fields, isi_ms, sums->isis, at);
+    float *window = at + isis, *mass = window + isis, depth = fields[DEPTH];
+    uint8_t *needed = (uint8_t *)(mass + isis * outcomes);
+    facilitations_at(fields, isi_ms, isis, at);
     memset(needed, 0, (size_t)rows);
-    for (int64_t t = -1; t < sums->isis; t++) {
+    for (int64_t t = -1; t < isis; t++) {
         int64_t row = row_below(position_of(t < 0 ? 0.0f : at[t], depth, rows), rows);
         needed[row] = needed[row + 1] = 1;
         if (t < 0 || fabsf(at[t]) < LEAST_LEVEL) continue;
@@ -35,51 +35,9 @@ static void foresee(Sums *sums, const Tables *tables, const float *fields, int64
     table_of(fields, order, levels, rows, needed, cells, outcomes, room, table);
     between_rows(table, rows, outcomes, depth, 0.0f, rest);
     for (int64_t t = from; t < to; t++) between_rows(table, rows, outcomes, depth, at[t], mass + t * outcomes);
+    for (int32_t t = 0; t < sums->points; t++)
+        window[t] = (runs[0] <= t && t < runs[1]) || (runs[2] <= t && t < runs[3]);
     add_sample(sums, window, rest, from < to ? from : 0, to, mass);
-}
-
-static int scores(const Tables *tables, int64_t people, int64_t samples, int64_t order, int64_t isis, int64_t points,
-                  const float *fields, const float *isi_ms, const float *masks, float *found) {
-    int64_t rows = tables->rows, outcomes = tables->outcomes, each = (rows + 1 + isis) * outcomes + 2 * NODES * rows;
-    each += isis + rows; /* as numbers of flags */
-    float ends[2], *room = malloc((size_t)(each + samples * (2 * rows + 1) + 2 * outcomes) * sizeof *room);
-    int failed = !room;
-    for (int64_t person = 0; !failed && person < people; person++) {
-        const float *own = fields + person * samples * FIELDS, *windows = masks + person * samples * points;
-        float *levels = room + each, *means = levels + samples * rows, *sorted = means + samples * rows;
-        float *cells = sorted + samples;
-        Sums sums;
-        evoked_means(samples, rows, own, levels, means);
-        ends_of(samples, rows, own, means, sorted, ends);
-        outcomes_between(ends, tables->cells, outcomes, cells);
-        failed = !begin(&sums, isis, outcomes, points);
-        for (int64_t s = 0; !failed && s < samples; s++, own += FIELDS, levels += rows, windows += points)
-            foresee(&sums, tables, own, order, levels, cells, isi_ms, windows, room);
-        failed = failed || reduced(&sums, samples, found + person * isis);
-        free(sums.rest);
-    }
-    free(room);
-    return failed ? -1 : 0;
-}
-
-/* Membership of the ISIs in the window of each sample, 0 or 1, (s, isis). */
-static int masks_of(const Tables *tables, int64_t samples, const float *fields, int64_t isis, const float *isi_ms,
-                    float *masks) {
-    float *room = malloc((size_t)(samples * (2 * tables->rows + 1)) * sizeof *room);
-    int32_t *runs = malloc((size_t)samples * 4 * sizeof *runs);
-    int failed = !room || !runs;
-    if (!failed) {
-        float *means = room + samples * tables->rows, *edges = means + samples * tables->rows;
-        evoked_means(samples, tables->rows, fields, room, means);
-        failed = windows_of(tables, samples, fields, means, isis, isi_ms, edges, runs);
-    }
-    for (int64_t s = 0; !failed && s < samples; s++) {
-        const int32_t *own = runs + 4 * s;
-        for (int32_t t = 0; t < isis; t++)
-            *masks++ = (own[0] <= t && t < own[1]) || (own[2] <= t && t < own[3]);
-    }
-    free(room), free(runs);
-    return failed;
 }
 
 static int ask(const Tables *tables, const Tables *usual, int64_t people, int64_t particles, int64_t size,
@@ -87,29 +45,38 @@ static int ask(const Tables *tables, const Tables *usual, int64_t people, int64_
                const int64_t *kinds, const float *densities, const double *log_weights, const float *isi_ms,
                float *found) {
     if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
-    int64_t points = of_window ? isis : 0;
+    int64_t rows = tables->rows, outcomes = tables->outcomes, of_all = size * (FIELDS + 2 * rows + 1);
+    int64_t of_one = 2 * NODES * rows + (rows + 1 + isis) * outcomes + 2 * isis + rows; /* with flags as numbers */
+    float *fields = malloc((size_t)(of_all + 2 * outcomes + of_one) * sizeof *fields);
     double *weights = malloc((size_t)particles * sizeof *weights);
     int64_t *picks = malloc((size_t)size * sizeof *picks);
-    float *fields = malloc((size_t)(size * (FIELDS + points)) * sizeof *fields);
-    int failed = !weights || !picks || !fields;
-    for (int64_t person = 0; !failed && person < people; person++) {
-        int64_t first = person * particles;
+    int32_t *runs = malloc((size_t)size * 4 * sizeof *runs);
+    int failed = !weights || !picks || !fields || !runs;
+    for (int64_t first = 0; !failed && first < people * particles; first += particles, found += isis) {
+        float *levels = fields + size * FIELDS, *means = levels + size * rows, *sorted = means + size * rows, ends[2];
+        float *cells = fields + of_all, *room = cells + 2 * outcomes;
         const float *own = values + first * tables->latents, *known = densities + first * kept_of(tables);
-        const int64_t *own_kinds = kinds + first * KINDS;
         const double *weighed = log_weights + first;
-        float *masks = fields + size * FIELDS;
+        Sums sums;
         if (usual) {
-            usual_weights(tables, usual, 1, particles, own, own_kinds, known, weighed, weights);
+            usual_weights(tables, usual, 1, particles, own, kinds + first * KINDS, known, weighed, weights);
             weighed = weights;
         }
-        failed = represent(tables, 1, particles, size, trials, own, own_kinds, weighed, picks, fields);
-        if (!failed && points) failed = masks_of(tables, size, fields, isis, isi_ms, masks);
-        for (float *one = fields; !failed && one < fields + size * FIELDS; one += FIELDS)
-            one[REST] += one[SLOPE] * (float)stronger;
-        float *to = found + person * isis;
-        failed = failed || scores(tables, 1, size, trials, isis, points, fields, isi_ms, masks, to);
+        failed = represent(tables, 1, particles, size, trials, own, kinds + first * KINDS, weighed, picks, fields) ||
+                 !begin(&sums, isis, outcomes, of_window ? isis : 0);
+        if (failed) break;
+        evoked_means(size, rows, fields, levels, means);
+        if (of_window) failed = windows_of(tables, size, fields, means, isis, isi_ms, sorted, runs);
+        for (int64_t i = 0; i < size; i++) fields[i * FIELDS + REST] += fields[i * FIELDS + SLOPE] * (float)stronger;
+        if (stronger != 0.0) evoked_means(size, rows, fields, levels, means);
+        ends_of(size, rows, fields, means, sorted, ends);
+        outcomes_between(ends, tables->cells, outcomes, cells);
+        for (int64_t i = 0; !failed && i < size; i++)
+            foresee(&sums, tables, fields + i * FIELDS, trials, levels + i * rows, cells, isi_ms, runs + 4 * i, room);
+        failed = failed || reduced(&sums, size, found);
+        free(sums.rest);
     }
-    free(weights), free(picks), free(fields);
+    free(weights), free(picks), free(fields), free(runs);
     return failed ? -1 : 0;
 }
 

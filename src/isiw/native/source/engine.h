@@ -102,11 +102,8 @@ typedef struct {
     variance of each point's membership less that expected after an outcome, summed. */
     int (*reductions)(int64_t samples, int64_t isis, int64_t outcomes, int64_t points, const float *mass,
                       const float *masks, float *found);
-    /* The same by what samples (b, s, FIELDS) predict of the next trial, after so many, (b, t). */
-    int (*scores)(const Tables *tables, int64_t people, int64_t samples, int64_t order, int64_t isis, int64_t points,
-                  const float *fields, const float *isi_ms, const float *masks, float *found);
-    /* The same by samples of particles, under another prior if there is one; their windows at these ISIs are those of
-    the pairs' intensity, and the next pulse is so much stronger [% RMT]. */
+    /* The same by samples of particles, under another prior if there is one, (b, t); their windows at these ISIs are
+    those of the pairs' intensity, and the next pulse is so much stronger [% RMT]. */
     int (*ask)(const Tables *tables, const Tables *usual, int64_t people, int64_t particles, int64_t size,
                int64_t trials, int32_t of_window, double stronger, int64_t isis, const float *values,
                const int64_t *kinds, const float *densities, const double *log_weights, const float *isi_ms,

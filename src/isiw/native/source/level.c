@@ -41,7 +41,6 @@ const Engine *NAMED(ISIW_LEVEL)(void) {
         .window_runs = window_runs,
         .best_window = best_window,
         .reductions = reductions,
-        .scores = scores,
         .ask = ask,
         .estimate = estimate,
         .elementary = elementary,

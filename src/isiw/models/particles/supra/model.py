@@ -10,8 +10,6 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Annotated
 
-import numpy as np
-
 from isiw.checks import MOST_OF_A_KIND, Checked, SmallestAmplitude, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
@@ -71,14 +69,6 @@ class SupraPosterior(SwarmPosterior[SupraModel]):
 
     def _sample(self, size: int, order: int) -> SupraSample:
         return SupraSample(self.swarm.picked(self.law, size)[1], self.space, order)
-
-    def reductions(self, isi_ms: Array, *, of_window: bool) -> Singles:
-        """How much the next MEP is expected to tell; see `ForeseesReductions`."""
-        sample, at_ms = self.sample, singles(isi_ms)
-        masks = np.empty((*sample.fields.shape[:2], 0), dtype=np.float32)
-        if of_window:
-            masks = np.concatenate((sample.window_masks(at_ms), sample.depressed_masks(at_ms)), axis=-1)
-        return self.law.scores(sample.fields, self.trials, at_ms, masks)
 
     def depressed_masks(self, isi_ms: Array) -> Singles:
         """Sampled depressed segments; see `SamplesDepression`."""
