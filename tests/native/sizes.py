@@ -63,8 +63,8 @@ def computed(case: Case, particles: int, told: History) -> Latents:
         for min_ess in (0.0, 1.0):  # kept, and resampled
             law.learn(told.columns, min_ess, (1, 2), dice, crowd)
     law.usual_weights(law, crowd)
-    law.represent(*drawn, crowd.log_weights, particles + 1, told.trials)
-    law.estimate(crowd, 0, particles + 1, told.trials)
+    law.represent(crowd, particles + 1, told.trials)
+    law.estimate(crowd, particles + 1, told.trials)
     for of_window in (False, True):
         for usual in (None, law):
             law.ask(crowd, grid_of(case.space), particles + 1, told.trials, Asking(of_window, usual, 5.0))

@@ -171,7 +171,9 @@ def test_only_those_whose_particles_have_worn_out_are_resampled() -> None:
 def test_weighted_particles_are_represented_by_evenly_spaced_picks() -> None:
     case, rng = CASES["default"], np.random.default_rng(8)
     latents, log_weights = case.drawn(300, 8, people=2), 3.0 * rng.standard_normal((2, 300))
-    picks, fields = case.law.represent(*latents, log_weights, 70, 9)
+    nothing = np.zeros((2, 300), dtype=np.float32)
+    crowd = Crowd(*latents, log_weights, nothing, case.law.nothing_known(2, 300))
+    picks, fields = case.law.represent(crowd, 70, 9)
     np.testing.assert_array_equal(picks, systematic(log_weights, 70))
     meant = case.fields(latents, 9)
     np.testing.assert_array_equal(fields, np.take_along_axis(meant, picks[..., np.newaxis], axis=1))

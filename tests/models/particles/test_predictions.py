@@ -49,17 +49,18 @@ def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(s
 def test_one_call_finds_the_windows_of_the_particles_that_stand_for_a_persons() -> None:
     posterior = ParticleModel(particles=300).begin(VALVE_SPACE, 3, people=2)
     for person in (0, 1):
-        picks, windows = posterior.law.estimate(posterior.swarm.crowd, person, 200, 0)
+        picks, windows = posterior.law.estimate(posterior.swarm.crowd.of_person(person), 200, 0)
         latents, fields = posterior.swarm.picked(posterior.law, 200, person)
-        np.testing.assert_array_equal(posterior.swarm.latents.of_person(person).taken(picks).values, latents.values)
+        np.testing.assert_array_equal(posterior.swarm.latents.values[person][picks], latents.values)
         masks = PersonSample(fields, VALVE_SPACE).window_masks(grid_of(VALVE_SPACE))[0]
         np.testing.assert_array_equal(windows.found, np.flatnonzero(masks.any(-1)))
         np.testing.assert_array_equal(windows.sizes, masks[windows.found].sum(-1))
         inside, f1 = Runs.of_masks(masks).best
         np.testing.assert_array_equal(windows.best[0], inside)
         assert windows.best[1] == f1
-    with pytest.raises(ValueError, match="no particles"):
-        posterior.law.estimate(posterior.swarm.crowd, 2, 200, 0)
+    for nobody in (posterior.swarm.crowd, posterior.swarm.crowd.of_person(2)):
+        with pytest.raises(ValueError, match="one person"):
+            posterior.law.estimate(nobody, 200, 0)
 
 
 @pytest.mark.slow

@@ -51,8 +51,11 @@ class Crowd(NamedTuple):
 
     def copied(self) -> Crowd:
         """The same, to be changed."""
-        log_weights, log_likelihood = self.log_weights.copy(), self.log_likelihood.copy()
-        return Crowd(self.values.copy(), self.kinds.copy(), log_weights, log_likelihood, self.densities.copy())
+        return Crowd._make(each.copy() for each in self)
+
+    def of_person(self, person: int) -> Crowd:
+        """The particles of one person, fields of shape (1, p)."""
+        return Crowd._make(each[person : person + 1] for each in self)
 
 
 class Asking(NamedTuple):
@@ -196,11 +199,10 @@ class Law:
 
     def usual_weights(self, usual: Law, crowd: Crowd) -> FloatArray:
         """Log weights of particles under another prior, which ISIs are chosen with, (b, p)."""
-        people, particles = self._require_particles(crowd.values, crowd.kinds)
-        found = np.empty((people, particles), dtype=DOUBLE)
-        weights = address(crowd.log_weights, DOUBLE, people, particles), address(found, DOUBLE, people, particles)
-        arrays = *self._values(crowd.values, crowd.kinds), self._known(crowd.densities, people, particles)
-        call("usual_weights", self._at, self._other(usual), people, particles, *arrays, *weights)
+        of, (values, kinds, weights, _, known) = self._crowd(crowd)
+        found = np.empty(of, dtype=DOUBLE)
+        arrays = values, kinds, known, weights, address(found, DOUBLE, *of)
+        call("usual_weights", self._at, self._other(usual), *of, *arrays)
         return found
 
     def _other(self, usual: Law) -> int:
@@ -208,9 +210,6 @@ class Law:
         if usual.latents != self.latents or usual._struct.kind_values != self._struct.kind_values:
             raise ValueError("the other prior is of other latents or kinds")
         return usual._at
-
-    def _known(self, densities: Singles, people: int, particles: int) -> int:
-        return address(densities, SINGLE, people, particles, self.blocks + 1)
 
     def ask(self, crowd: Crowd, isi_ms: Singles, size: int, trials: int, how: Asking) -> Singles:
         """How much the next trial, after so many, is expected to tell at some ISIs [ms] (t,), (b, t).
@@ -222,31 +221,26 @@ class Law:
             trials: how many came before.
             how: about what, by which prior, and at which intensity.
         """
-        people, particles = self._require_particles(crowd.values, crowd.kinds)
-        if not particles or not size:
-            raise ValueError("nothing stands for no particles")
-        found, isis = np.empty((people, len(isi_ms)), dtype=SINGLE), len(isi_ms)
-        known, at = self._known(crowd.densities, people, particles), address(isi_ms, SINGLE, isis)
-        weights = address(crowd.log_weights, DOUBLE, people, particles)
+        of, (values, kinds, weights, _, known) = self._crowd(crowd, least=1)
+        if size < 1:
+            raise ValueError("no particles stand for others")
+        isis, found = len(isi_ms), np.empty((of[0], len(isi_ms)), dtype=SINGLE)
+        arrays = values, kinds, known, weights, address(isi_ms, SINGLE, isis), address(found, SINGLE, of[0], isis)
         usual = None if how.usual is None else self._other(how.usual)
-        sizes = people, particles, size, trials, how.of_window, how.stronger_pct_rmt, isis
-        arrays = *self._values(crowd.values, crowd.kinds), known, weights, at, address(found, SINGLE, people, isis)
+        sizes = *of, size, trials, how.of_window, how.stronger_pct_rmt, isis
         call("ask", self._at, usual, *sizes, *arrays)
         return found
 
-    def estimate(self, crowd: Crowd, person: int, size: int, trials: int) -> tuple[IntArray, Runs]:
+    def estimate(self, crowd: Crowd, size: int, trials: int) -> tuple[IntArray, Runs]:
         """Particles of equal weight that stand for one person's after so many trials: numbers (1, s), and windows."""
-        values, kinds, log_weights, *_ = (each[person : person + 1] for each in crowd)
-        people, particles = self._require_particles(values, kinds)
-        if people != 1 or not particles:
-            raise ValueError("nothing stands for no particles")
+        (people, particles), given = self._crowd(crowd, least=1)
+        if people != 1:
+            raise ValueError("one person is estimated at a time")
         points, picks, runs = self._struct.points, np.empty((1, size), dtype=WHOLE), np.empty((size, 2, 2), dtype=PLACE)
         best, f1 = np.empty(points, dtype=FLAG), np.empty(1, dtype=DOUBLE)
-        weights, cuts = address(log_weights, DOUBLE, 1, particles), address(CUTS, DOUBLE, len(CUTS))
         found = address(picks, WHOLE, 1, size), address(runs, PLACE, size, 2, 2), address(best, FLAG, points)
-        sizes = particles, size, trials, len(CUTS)
-        given = *self._values(values, kinds), weights, cuts
-        call("estimate", self._at, *sizes, *given, *found, address(f1, DOUBLE, 1))
+        arrays = *given[:3], address(CUTS, DOUBLE, len(CUTS)), *found, address(f1, DOUBLE, 1)
+        call("estimate", self._at, particles, size, trials, len(CUTS), *arrays)
         return picks, Runs(runs, points, (best, f1.item()))
 
     def learn(self, columns: Singles, min_ess: float, sweeps: tuple[int, int], dice: Seeds, crowd: Crowd) -> FloatArray:
@@ -264,40 +258,31 @@ class Law:
             accepted, jumps, and those that were accepted; the probabilities, before the trial, of amplitudes below its
             lower and its upper end times the weights of particles that predict it, and these weights, summed, (b, 9).
         """
-        people, particles = self._require_particles(crowd.values, crowd.kinds)
+        (people, particles), arrays = self._crowd(crowd, least=2)
         trials, found = columns.shape[1], np.empty((people, 9), dtype=DOUBLE)
-        if particles < 2 or not trials:
-            raise ValueError("particles move by differences of others, and learn from a trial")
-        call(
-            "learn",
-            self._at,
-            people,
-            particles,
-            trials,
-            address(columns, SINGLE, people, trials, COLUMNS),
-            min_ess,
-            *sweeps,
-            address(dice, NATURAL, people),
-            *self._values(crowd.values, crowd.kinds),
-            address(crowd.log_weights, DOUBLE, people, particles),
-            address(crowd.log_likelihood, SINGLE, people, particles),
-            self._known(crowd.densities, people, particles),
-            address(found, DOUBLE, people, 9),
-        )
+        if not trials:
+            raise ValueError("particles learn from a trial")
+        told = address(columns, SINGLE, people, trials, COLUMNS)
+        arrays = address(dice, NATURAL, people), *arrays, address(found, DOUBLE, people, 9)
+        call("learn", self._at, people, particles, trials, told, min_ess, *sweeps, *arrays)
         return found
 
-    def represent(
-        self, values: Singles, kinds: IntArray, log_weights: FloatArray, size: int, trials: int
-    ) -> tuple[IntArray, Singles]:
+    def represent(self, crowd: Crowd, size: int, trials: int) -> tuple[IntArray, Singles]:
         """Equally weighted particles that stand for weighted ones: numbers (b, s), and fields after so many trials."""
-        people, particles = self._require_particles(values, kinds)
-        if not particles:
-            raise ValueError("nothing stands for no particles")
+        (people, particles), given = self._crowd(crowd, least=1)
         picks, fields = np.empty((people, size), dtype=WHOLE), np.empty((people, size, FIELDS), dtype=SINGLE)
-        weights = address(log_weights, DOUBLE, people, particles)
-        arrays = weights, address(picks, WHOLE, people, size), address(fields, SINGLE, *fields.shape)
-        call("represent", self._at, people, particles, size, trials, *self._values(values, kinds), *arrays)
+        arrays = *given[:3], address(picks, WHOLE, people, size), address(fields, SINGLE, *fields.shape)
+        call("represent", self._at, people, particles, size, trials, *arrays)
         return picks, fields
+
+    def _crowd(self, crowd: Crowd, least: int = 0) -> tuple[tuple[int, int], tuple[int, ...]]:
+        """How many people and particles there are, and where each array of a crowd is; raise with less than needed."""
+        of = self._require_particles(crowd.values, crowd.kinds)
+        if of[1] < least:
+            raise ValueError(f"{least} particles are needed, since they stand for others, or move by their differences")
+        values, kinds = self._values(crowd.values, crowd.kinds)
+        weights, likelihood = address(crowd.log_weights, DOUBLE, *of), address(crowd.log_likelihood, SINGLE, *of)
+        return of, (values, kinds, weights, likelihood, address(crowd.densities, SINGLE, *of, self.blocks + 1))
 
     def _values(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
         return address(values, SINGLE, *values.shape), address(kinds, WHOLE, *kinds.shape)

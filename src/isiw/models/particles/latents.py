@@ -113,10 +113,6 @@ class Latents(NamedTuple):
         """What changes in the session, (b, p)."""
         return self.kinds[..., 4]
 
-    def of_person(self, person: int) -> Latents:
-        """The particles of one person, fields of shape (1, p)."""
-        return Latents(self.values[person : person + 1], self.kinds[person : person + 1])
-
     def taken(self, picks: IntArray) -> Latents:
         """Some of the particles of each person, by their numbers (b, s), fields of shape (b, s, ...)."""
         people, particles, _ = self.values.shape

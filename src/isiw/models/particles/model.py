@@ -175,8 +175,9 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
         prior, swarm = self.model.prior, self.swarm
-        picks, windows = self.law.estimate(swarm.weighed_crowd, person, self.model.particles, self.trials)
-        latents = swarm.latents.of_person(person).taken(picks)
+        crowd = swarm.weighed.of_person(person)
+        picks, windows = self.law.estimate(crowd, self.model.particles, self.trials)
+        latents = Latents(crowd.values, crowd.kinds).taken(picks)
 
         def profiles() -> SampledProfiles:
             few = swarm.picked(self.law, self.model.thinned, person)[1]

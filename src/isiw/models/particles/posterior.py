@@ -77,7 +77,7 @@ class SwarmPosterior(ABC, Generic[M]):
 
     def condition(self, isi_ms: Array, mep_mv: Array) -> Self:
         """The same particles, weighed by an imagined trial; see `Conditions`."""
-        return replace(self, swarm=self.swarm.weighed(self._trial(Observation.of(isi_ms, mep_mv)), self.law))
+        return replace(self, swarm=self.swarm.conditioned(self._trial(Observation.of(isi_ms, mep_mv)), self.law))
 
     def _trial(self, observation: Observation) -> History:
         known = self.model.detection_limit_mv, self.model.response_threshold_mv

@@ -129,7 +129,7 @@ class Swarm:
         return law.usual_weights(usual, self.crowd)
 
     @property
-    def weighed_crowd(self) -> Crowd:
+    def weighed(self) -> Crowd:
         """The particles with these log weights."""
         return self.crowd._replace(log_weights=self.log_weights)
 
@@ -188,7 +188,7 @@ class Swarm:
         """The particles of each half of each person, to be changed."""
         people, particles = self.log_weights.shape
         rows = people * self.halves, particles // self.halves
-        return Crowd._make(each.reshape(*rows, *each.shape[2:]) for each in self.weighed_crowd.copied())
+        return Crowd._make(each.reshape(*rows, *each.shape[2:]) for each in self.weighed.copied())
 
     def after(self, trial: History, law: Law, moves: Moving, seed: int) -> Swarm:
         """The particles after one more trial: weighed, resampled where too few carry the posterior, and moved."""
@@ -215,7 +215,7 @@ class Swarm:
         below, weights = np.split(sums.sum(1), [2], axis=1)
         return self.bets.after(below / np.maximum(weights, 1e-300))
 
-    def weighed(self, trial: History, law: Law) -> Swarm:
+    def conditioned(self, trial: History, law: Law) -> Swarm:
         """The same particles, weighed by one more trial as well."""
         crowd = self._rows
         told = self._as_curves_have_it(trial, law, crowd)
@@ -276,8 +276,6 @@ class Swarm:
             size: how many.
             person: of one person alone.
         """
-        latents, log_weights = self.latents, self.log_weights
-        if person is not None:
-            latents, log_weights = latents.of_person(person), log_weights[person : person + 1]
-        picks, fields = law.represent(*latents, log_weights, size, self.trials)
-        return latents.taken(picks), fields
+        crowd = self.weighed if person is None else self.weighed.of_person(person)
+        picks, fields = law.represent(crowd, size, self.trials)
+        return Latents(crowd.values, crowd.kinds).taken(picks), fields
