@@ -222,7 +222,8 @@ Flag: TypeAlias = Annotated[bool, flag]
 
 def can(value: object, capability: Callable[..., _T]) -> TypeGuard[_T]:
     """True if a value has all that a protocol names: `isinstance`, which works properties out whenever it is asked."""
-    return _all_can(type(value), capability) or all(hasattr(value, name) for name in _names(capability))
+    by_type = _all_can(type(value), capability)  # type: ignore[arg-type] # a type has a hash
+    return by_type or all(hasattr(value, name) for name in _names(capability))
 
 
 @cache

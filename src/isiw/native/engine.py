@@ -208,20 +208,19 @@ def require_built_of(library: ctypes.CDLL, folder: Path) -> None:
         )
 
 
-def _made(name: str, sizes: Sequence[int], given: Sequence[tuple[Singles, _Shape]], *shapes: _Shape) -> Any:
-    """What a function makes of sizes and of arrays, which must have some shapes: arrays of some shapes, or the one."""
+def _made(name: str, sizes: Sequence[int], given: Sequence[tuple[Singles, _Shape]], *shapes: _Shape) -> list[Singles]:
+    """What a function makes of sizes and of arrays, which must have some shapes: arrays of some shapes."""
     found = [np.empty(shape, dtype=SINGLE) for shape in shapes]
     arrays = (*given, *zip(found, shapes, strict=True))
     call(name, *sizes, *(address(array, SINGLE, *shape) for array, shape in arrays))
-    return found[0] if len(found) == 1 else tuple(found)
+    return found
 
 
 def log_likelihoods(fields: Singles, columns: Singles) -> Singles:
     """Log likelihood of each person's trials (b, n, columns) under each particle (b, p, fields), (b, p)."""
     (people, particles, _), trials = fields.shape, columns.shape[1]
     given = _fields(fields), (columns, (people, trials, COLUMNS))
-    found: Singles = _made("likelihoods", (people, particles, trials), given, (people, particles))
-    return found
+    return _made("likelihoods", (people, particles, trials), given, (people, particles))[0]
 
 
 def evoked_means(fields: Singles, rows: int) -> tuple[Singles, Singles]:
@@ -230,8 +229,8 @@ def evoked_means(fields: Singles, rows: int) -> tuple[Singles, Singles]:
     Rows are at squares of equal steps, or where there is a depression at equal steps from below 0.
     """
     shape = *fields.shape[:2], _rows(rows)
-    found: tuple[Singles, Singles] = _made("evoked_means", (_samples(fields), rows), [_fields(fields)], shape, shape)
-    return found
+    levels, means = _made("evoked_means", (_samples(fields), rows), [_fields(fields)], shape, shape)
+    return levels, means
 
 
 def outcome_tables(
@@ -250,23 +249,21 @@ def outcome_tables(
     rows = *of, levels.shape[2]
     given = _fields(fields), (levels, rows), (means, rows), (cells, (outcomes + 1,))
     sizes = *rows, outcomes, order
-    found: tuple[Singles, Singles] = _made("outcome_tables", sizes, given, (of[0], 2), (*rows, outcomes))
-    return found
+    ends, table = _made("outcome_tables", sizes, given, (of[0], 2), (*rows, outcomes))
+    return ends, table
 
 
 def rows_between(fields: Singles, table: Singles, levels: Singles) -> Singles:
     """What lies between the rows of tables (b, s, l, y) at facilitations (b, s, t), (b, s, t, y)."""
     of, (rows, outcomes), isis = fields.shape[:2], table.shape[2:], levels.shape[2]
     given = _fields(fields), (table, (*of, _rows(rows), outcomes)), (levels, (*of, isis))
-    found: Singles = _made("rows_between", (_samples(fields), rows, isis, outcomes), given, (*of, isis, outcomes))
-    return found
+    return _made("rows_between", (_samples(fields), rows, isis, outcomes), given, (*of, isis, outcomes))[0]
 
 
 def facilitations(fields: Singles, isi_ms: Singles) -> Singles:
     """Facilitation of each particle at some ISIs [ms] (t,), (b, s, t)."""
     given, isis = (_fields(fields), (isi_ms, (len(isi_ms),))), len(isi_ms)
-    found: Singles = _made("facilitations", (_samples(fields), isis), given, (*fields.shape[:2], isis))
-    return found
+    return _made("facilitations", (_samples(fields), isis), given, (*fields.shape[:2], isis))[0]
 
 
 def edge_levels(fields: Singles, evoked: Singles, isi_ms: Singles, *, fine: bool) -> Singles:
@@ -282,8 +279,7 @@ def edge_levels(fields: Singles, evoked: Singles, isi_ms: Singles, *, fine: bool
     if not isis:
         raise ValueError("windows are looked for at some ISIs")
     given = _fields(fields), (evoked, (*of, _rows(rows))), (isi_ms, (isis,))
-    found: Singles = _made("edge_levels", (_samples(fields), rows, isis, fine), given, of)
-    return found
+    return _made("edge_levels", (_samples(fields), rows, isis, fine), given, of)[0]
 
 
 def window_runs(fields: Singles, levels: Singles, isi_ms: Singles) -> NDArray[np.int32]:
@@ -321,8 +317,7 @@ def reductions(mass: Singles, masks: Singles) -> Singles:
     """
     (samples, isis, outcomes), points = mass.shape, masks.shape[1]
     given = (mass, mass.shape), (masks, (samples, points))
-    found: Singles = _made("reductions", (samples, isis, outcomes, points), given, (isis,))
-    return found
+    return _made("reductions", (samples, isis, outcomes, points), given, (isis,))[0]
 
 
 def _fields(fields: Singles) -> tuple[Singles, _Shape]:

@@ -67,20 +67,9 @@ class TabledSample:
 
     def _with_floor_mv(self, evoked: Singles) -> Singles:
         """From an expected MEP above the floor, in floors, to mV, shape (b, s, ...)."""
-        floor_mv, rest = (each[..., np.newaxis] for each in (np.exp(self._log_floor), self._rest))
+        floor_mv, rest = np.exp(self.fields[..., LOG_FLOOR, None]), np.exp(0.5 * self.fields[..., FLOOR_SD, None] ** 2)
         found: Singles = floor_mv * (evoked + rest)
         return found
-
-    @property
-    def _log_floor(self) -> Singles:
-        """Log of the EMG floor [mV], shape (b, s)."""
-        return self.fields[..., LOG_FLOOR]
-
-    @property
-    def _rest(self) -> Singles:
-        """Mean of the floor, in medians, shape (b, s)."""
-        mean: Singles = np.exp(0.5 * np.square(self.fields[..., FLOOR_SD]))
-        return mean
 
     @cached_property
     def _rows(self) -> tuple[Singles, Singles]:

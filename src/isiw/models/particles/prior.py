@@ -209,7 +209,7 @@ class Prior(Checked):
     def hypothesis(self, latents: Latents) -> IntArray:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
         found, curved = self._hypothesis_numbers[latents.noise, 0], latents.noise == NoiseKind.RECRUITMENT
-        curve = self.mixtures["recruitment"].component(latents.values[curved][:, latents_of("recruitment")])
+        curve = self.mixtures["recruitment"].component(latents.values[curved][:, _OF_CURVE])
         found[curved] = self._hypothesis_numbers[NoiseKind.RECRUITMENT, curve]
         return found
 
@@ -249,6 +249,9 @@ class Prior(Checked):
         own, rectified = latents.of("log_boost"), latents.of(RECTIFIED["log_boost"])
         boost = np.exp(np.where(latents.noise == NoiseKind.RECTIFIED, rectified, own))
         return np.where(latents.present, boost, np.float32(0.0))
+
+
+_OF_CURVE: Final = latents_of("recruitment")
 
 
 def _of_gain(law: Gain) -> list[tuple[float, float]]:

@@ -124,19 +124,19 @@ static int best_window(int64_t samples, int64_t most_runs, int64_t isis, int64_t
                        const double *shares, uint8_t *inside, double *f1) {
     int64_t *before = calloc((size_t)(2 * isis + 2), sizeof *before), windows = 0, within = 0;
     if (!before) return -1;
-    int64_t *members = before + isis + 1;
-    double most = 0.0;
+    int64_t *members = before + isis + 1, most = 0;
     for (int64_t s = 0; s < samples; s++) {
         const int32_t *own = runs + s * most_runs * 2;
         windows += own[0] < own[1];
         for (int64_t i = 0; i < 2 * most_runs; i += 2) members[own[i]]++, members[own[i + 1]]--;
     }
-    for (int64_t t = 0; t < isis; t++) within = members[t] += within;
-    double per = (double)(windows ? windows : 1);
-    for (int64_t t = 0; t < isis; t++) most = fmax(most, (double)members[t] / per), inside[t] = 0;
+    for (int64_t t = 0; t < isis; t++) {
+        within = members[t] += within, inside[t] = 0;
+        most = within > most ? within : most;
+    }
     *f1 = 0.0;
     for (int64_t cut = 0; windows && cut < cuts; cut++) {
-        double least = shares[cut] * most;
+        double per = (double)windows, least = shares[cut] * ((double)most / per);
         for (int64_t t = 0; t < isis; t++) before[t + 1] = before[t] + ((double)members[t] / per >= least);
         double found = expected_f1(runs, samples, most_runs, before, isis);
         if (cut && found <= *f1) continue;
