@@ -65,12 +65,14 @@ class Bets:
         low, high = _laws(np.stack((middle - half, middle + half)))
         paid = (high - low) / (2.0 * half[..., np.newaxis])  # (n, b, 4)
         kept = 1.0 + STAKED[:, np.newaxis] * (paid[..., np.newaxis, :] - 1.0)
-        return np.log(np.maximum(kept, NARROWEST)).reshape(*below.shape[:2], -1).cumsum(0)
+        won: FloatArray = np.log(np.maximum(kept, NARROWEST)).reshape(*below.shape[:2], -1).cumsum(0)
+        return won
 
     @cached_property
     def most(self) -> FloatArray:
         """Log of the largest mean of them so far, (b,)."""
-        return np.maximum(0.0, (log_sum(self.log_won) - math.log(self.log_won.shape[-1])).max(0))
+        most: FloatArray = (log_sum(self.log_won) - math.log(self.log_won.shape[-1])).max(0, initial=0.0)
+        return most
 
     def worth(self, person: int) -> float:
         """What a bet of 1 against one person's law has been worth at most."""

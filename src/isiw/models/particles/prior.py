@@ -208,7 +208,8 @@ class Prior(Checked):
 
     def hypothesis(self, latents: Latents) -> IntArray:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
-        found, curved = self._hypothesis_numbers[latents.noise, 0], latents.noise == NoiseKind.RECRUITMENT
+        curved = latents.noise == NoiseKind.RECRUITMENT
+        found: IntArray = self._hypothesis_numbers[latents.noise, 0]
         curve = self.mixtures["recruitment"].component(latents.values[curved][:, _OF_CURVE])
         found[curved] = self._hypothesis_numbers[NoiseKind.RECRUITMENT, curve]
         return found
