@@ -222,14 +222,7 @@ Flag: TypeAlias = Annotated[bool, flag]
 
 def can(value: object, capability: Callable[..., _T]) -> TypeGuard[_T]:
     """True if a value has all that a protocol names: `isinstance`, which works properties out whenever it is asked."""
-    by_type = _all_can(type(value), capability)  # type: ignore[arg-type] # a type has a hash
-    return by_type or all(hasattr(value, name) for name in _names(capability))
-
-
-@cache
-def _all_can(kind: type, capability: Any) -> bool:
-    """Whether all values of a type have what a protocol names."""
-    return all(hasattr(kind, name) for name in _names(capability))
+    return all(hasattr(type(value), name) or hasattr(value, name) for name in _names(capability))
 
 
 @cache

@@ -147,7 +147,7 @@ def sweeps(
     (people, particles, latents), trials = state[0].shape, columns.shape[1]
     assert latents == law.latents
     counts, of = np.zeros((people, 4), dtype=np.float32), (people, particles)
-    arrays = [
+    arrays: list[tuple[Any, Any, tuple[int, ...]]] = [
         (numbers, engine.WHOLE, (people,)),
         (columns, engine.SINGLE, (people, trials, engine.COLUMNS)),
         (dice, engine.NATURAL, (people,)),
