@@ -221,8 +221,8 @@ Flag: TypeAlias = Annotated[bool, flag]
 
 
 def can(value: object, capability: Callable[..., _T]) -> TypeGuard[_T]:
-    """True if a value has all that a protocol names: `isinstance`, which collects the names whenever it is asked."""
-    return all(hasattr(value, name) for name in _names(capability))
+    """True if a value has all that a protocol names: `isinstance`, which works properties out whenever it is asked."""
+    return all(hasattr(type(value), name) or hasattr(value, name) for name in _names(capability))
 
 
 @cache

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.models.windows import Runs, SampledProfiles, best_window, edge_samples, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, edge_samples, profile_grid, sampled_estimate
 from isiw.strategy.catalogue import make_strategy
+from isiw.window import Window
 from known import known
 
 SPACE = DesignSpace(0, 9, reference="impact")
@@ -21,7 +22,8 @@ def flat(samples: int) -> Callable[[], SampledProfiles]:
 
 
 def test_certain_membership_is_reported_as_it_is() -> None:
-    window, expected_f1 = best_window(masks("0111001100", "0111001100"), SPACE.grid_ms)
+    inside, expected_f1 = masks("0111001100", "0111001100").best
+    window = Window.from_mask(SPACE.grid_ms, inside)
     assert known(window).segments == ((1.0, 3.0), (6.0, 7.0))
     assert expected_f1 == 1.0
 
@@ -30,8 +32,7 @@ def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets() -> 
     rng = np.random.default_rng(0)
     starts, ends = rng.integers(0, 5, 200), rng.integers(5, 10, 200)
     samples = np.array([[float(a <= t <= b) for t in range(10)] for a, b in zip(starts, ends, strict=True)])
-    window, told = best_window(Runs.of_masks(samples), SPACE.grid_ms)
-    reported = known(window).mask(SPACE.grid_ms)
+    reported, told = Runs.of_masks(samples).best
 
     def expected_f1(mask: np.ndarray) -> float:
         return float(np.mean(2 * (samples * mask).sum(1) / (samples.sum(1) + mask.sum())))
@@ -54,9 +55,10 @@ def test_more_than_one_segment_has_a_probability_given_a_window() -> None:
 
 
 def test_runs_of_pairs_are_those_of_masks() -> None:
-    pairs = np.array([[1, 4, 6, 8], [0, 2, 0, 0], [0, 0, 0, 0], [0, 0, 2, 10]])
-    ours, theirs = Runs.of_pairs(pairs, 10), masks("0111001100", "1100000000", "0000000000", "0011111111")
-    for name in ("sample", "first", "behind", "sizes", "membership", "found", "hulls"):
+    pairs = np.array([[1, 4, 6, 8], [0, 2, 0, 0], [0, 0, 0, 0], [2, 10, 0, 0]])
+    ours, theirs = Runs(pairs.reshape(-1, 2, 2), 10), masks("0111001100", "1100000000", "0000000000", "0011111111")
+    assert theirs.found.tolist() == [0, 1, 3]
+    for name in ("sizes", "found", "hulls"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), name)
 
 

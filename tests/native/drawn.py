@@ -20,8 +20,9 @@ from isiw.models.particles.supra import jumps as supra_jumps
 from isiw.models.particles.supra import prior as supra_prior
 from isiw.models.shared.history import Circumstances, History
 from isiw.models.shared.scales import Scale
+from isiw.native import engine
 from isiw.native.engine import COLUMNS
-from isiw.types import Singles
+from isiw.types import IntArray, Singles
 from native import reference
 
 PLACES: Final = ProfilePrior(
@@ -126,3 +127,50 @@ def history(people: int, number: int, seed: int, **around: float) -> History:
     made = np.concatenate([columns(trials(number, rng)) for _ in range(people)])
     made[..., COLUMNS - len(Circumstances._fields) :] = Circumstances(**around)
     return History(made)
+
+
+def sweeps(
+    law: Law, numbers: IntArray, columns: Singles, dice: Any, state: tuple[Singles, IntArray, Singles, Singles]
+) -> Singles:
+    """Move each person's particles so many times (b,), in place; the counts of their moves, (b, 4).
+
+    Args:
+        law: the prior and the moves.
+        numbers: how often each person's particles move, (b,).
+        columns: the trials, (b, n, columns).
+        dice: seeds, which move on, (b,).
+        state: latents, kinds, log likelihood and log densities of blocks of the particles, which change.
+
+    Returns:
+        Shifts, those that were accepted, jumps, and those that were accepted, (b, 4).
+    """
+    (people, particles, latents), trials = state[0].shape, columns.shape[1]
+    assert latents == law.latents
+    counts, of = np.zeros((people, 4), dtype=np.float32), (people, particles)
+    arrays: list[tuple[Any, Any, tuple[int, ...]]] = [
+        (numbers, engine.WHOLE, (people,)),
+        (columns, engine.SINGLE, (people, trials, engine.COLUMNS)),
+        (dice, engine.NATURAL, (people,)),
+        (state[0], engine.SINGLE, (*of, latents)),
+        (state[1], engine.WHOLE, (*of, engine.KINDS)),
+        (state[2], engine.SINGLE, of),
+        (state[3], engine.SINGLE, (*of, law.blocks + 1)),
+        (counts, engine.SINGLE, (people, 4)),
+    ]
+    at = (engine.address(array, dtype, *shape) for array, dtype, shape in arrays)
+    engine.call("sweeps", law._at, people, particles, trials, *at)  # noqa: SLF001 - only tests move alone
+    return counts
+
+
+ELEMENTARY = ("exp", "exp2", "log", "per", "per_root", "between")
+
+
+def elementary(name: str, x: Singles, y: Singles | None = None) -> Singles:
+    """One of the elementary functions that the engine is made of, of some numbers (n,).
+
+    `between` is the probability that a standard normal variable is between x and y.
+    """
+    found = np.empty(len(x), dtype=np.float32)
+    arrays = (engine.address(array, engine.SINGLE, len(x)) for array in (x, x if y is None else y, found))
+    engine.call("elementary", ELEMENTARY.index(name), len(x), *arrays)
+    return found

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks import sanitized
 from isiw.design import DesignSpace
 from isiw.models.particles.changes import ChangePrior
-from isiw.models.particles.compiled import Crowd
+from isiw.models.particles.compiled import Asking, Crowd
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.places import Place
 from isiw.models.particles.predictions import PersonSample
@@ -24,9 +24,9 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.history import Circumstances, History, neutral
 from isiw.models.shared.scales import Scale
-from isiw.models.windows import Runs, best_window, grid_of
-from isiw.native.engine import entropy_reductions, log_likelihoods, variance_reductions
-from native.drawn import Case, seeds
+from isiw.models.windows import Runs, grid_of
+from isiw.native.engine import log_likelihoods, reductions
+from native.drawn import Case, seeds, sweeps
 
 TRIALS = (0, 1, 2, 7, 8, 9, 15, 16, 17, 63, 64, 65, 127, 128, 129, 257)
 PARTICLES = (2, 3, 15, 16, 17, 65)
@@ -57,13 +57,17 @@ def computed(case: Case, particles: int, told: History) -> Latents:
     law, drawn, dice = case.law, case.drawn(particles, particles), seeds(particles)
     equal, nothing = np.full((1, particles), -np.log(particles)), law.nothing_known(1, particles)
     state = *drawn, log_likelihoods(case.fields(drawn), told.columns), nothing
-    law.sweeps(np.array([2]), told.columns, dice, state)
+    sweeps(law, np.array([2]), told.columns, dice, state)
     crowd = Crowd(*drawn, equal, *state[2:])
     if told.trials:
         for min_ess in (0.0, 1.0):  # kept, and resampled
             law.learn(told.columns, min_ess, (1, 2), dice, crowd)
     law.usual_weights(law, crowd)
-    law.represent(*drawn, crowd.log_weights, particles + 1, told.trials)
+    law.represent(crowd, particles + 1, told.trials)
+    law.estimate(crowd, particles + 1, told.trials)
+    for of_window in (False, True):
+        for usual in (None, law):
+            law.ask(crowd, grid_of(case.space), particles + 1, told.trials, Asking(of_window, usual, 5.0))
     case.fields(drawn, told.trials)
     return drawn
 
@@ -73,14 +77,12 @@ def predicted(case: Case, latents: Latents) -> None:
     sample = (SupraSample if case.supra else PersonSample)(case.fields(latents, 1), case.space, 1)
     isi_ms = grid_of(case.space)
     mass, masks = sample.outcome_mass(isi_ms), sample.window_masks(isi_ms)
-    for person, foreseen in enumerate(sample.foreseen(isi_ms)):
-        for each in (mass[person], foreseen):
-            entropy_reductions(each)
-            variance_reductions(each, masks[person])
+    for points in (0, 1, len(isi_ms)):
+        inside = masks[..., :points].copy()
+        reductions(mass[0], inside[0])
     sample.expected_mep_mv(isi_ms)
-    windows = Runs.of_masks(masks[0])
-    if len(windows.found):
-        best_window(windows, isi_ms.astype(float))
+    best, _ = Runs.of_masks(masks[0]).best
+    assert len(best) == len(isi_ms)
 
 
 def with_components(number: int) -> Prior:

@@ -3,7 +3,7 @@
 import mpmath
 import numpy as np
 
-from isiw.native.engine import elementary
+from native.drawn import elementary
 
 LEAST_MASS = 1e-9
 """That of likelihood.h."""

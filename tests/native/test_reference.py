@@ -24,7 +24,7 @@ from isiw.models.shared.history import Circumstances
 from isiw.native import engine
 from isiw.native.engine import COLUMNS, FIELDS, UNKNOWN, log_likelihoods
 from native import reference
-from native.drawn import CASES, PLACES, Case, columns, seeds, trials
+from native.drawn import CASES, PLACES, Case, columns, seeds, sweeps, trials
 
 ORDERS = (0, 1, 12)
 FEW_MS = np.array([0.0, 40.0, 90.0, 180.0, 233.0, 260.0, 300.0, np.nan], dtype=np.float32)
@@ -84,12 +84,12 @@ def test_tables_of_predictions_are_those_of_the_reference(name: str, order: int)
     both = list(zip(particles, levels, strict=True))
     evoked = [[reference.expected_evoked(one, order, at) for at in own] for one, own in both]
     np.testing.assert_allclose(means[0], evoked, rtol=3e-4, atol=1e-4)
-    log_mep, widths = np.sort(rng.uniform(-7.0, 2.0, (1, outcomes))), rng.random(outcomes)
-    cells = log_mep.astype(np.float32), widths.astype(np.float32)
-    found = engine.outcome_tables(fields, rows, order, *cells)[0]
+    cells = np.sort(rng.random(outcomes + 1)).astype(np.float32)
+    ((low, high),), (found,) = engine.outcome_tables(fields, rows, means, order, cells)
+    log_mep, widths = low + (high - low) * 0.5 * (cells[1:] + cells[:-1]).astype(float), np.diff(cells.astype(float))
     for one, own, masses in zip(particles, levels, found, strict=True):
         for row in (0, 5, LEVELS - 1):
-            expected = reference.outcome_masses(one, order, own[row], cells[0][0].astype(float), widths)
+            expected = reference.outcome_masses(one, order, own[row], log_mep, widths)
             np.testing.assert_allclose(masses[row], expected, atol=1e-4)
 
 
@@ -113,7 +113,7 @@ def test_windows_expected_meps_and_baselines_are_those_of_the_reference(space: D
     sample, grid_ms = PersonSample(case.fields(drawn, order), space, order), np.array(space.grid_ms)
     masks, isi_ms = sample.window_masks(grid_ms.astype(np.float32))[0], FEW_MS[:-1]
     means_mv, baselines_mv = sample.expected_mep_mv(isi_ms)[0], sample.baselines_mv()[0]
-    runs = sample.runs(grid_ms.astype(np.float32))
+    runs = engine.window_runs(sample.fields, sample.edge_level, grid_ms.astype(np.float32))[0].reshape(-1, 2, 2)
     for i, one in enumerate(case.particles(drawn)):
         rows = reference.row_levels(one, LEVELS)
         evoked = np.array([reference.expected_evoked(one, order, at) for at in rows])
@@ -129,8 +129,9 @@ def test_windows_expected_meps_and_baselines_are_those_of_the_reference(space: D
         np.testing.assert_allclose(means_mv[i], reference.expected_mep_mv(one, order, between), rtol=5e-4)
         assert baselines_mv[i] == pytest.approx(reference.expected_mep_mv(one, order, evoked[0]), rel=5e-4)
     inside = np.zeros(masks.shape)
-    for one_run in zip(runs.sample, runs.first, runs.behind, strict=True):
-        inside[one_run[0], one_run[1] : one_run[2]] = 1.0
+    for i, own in enumerate(runs.tolist()):
+        for first, behind in own:
+            inside[i, first:behind] = 1.0
     np.testing.assert_array_equal(inside, masks)
 
 
@@ -179,7 +180,7 @@ def test_densities_of_the_priors_blocks_are_those_of_the_reference(name: str) ->
     drawn = case.of_all_kinds(120, 9)
     law, state = case.law, (drawn.values, drawn.kinds, np.zeros((1, 120), dtype=np.float32))
     kept = law.nothing_known(1, 120)
-    law.sweeps(np.array([4]), np.zeros((1, 0, COLUMNS), dtype=np.float32), seeds(9), (*state, kept))
+    sweeps(law, np.array([4]), np.zeros((1, 0, COLUMNS), dtype=np.float32), seeds(9), (*state, kept))
     found = case.prior.log_densities(drawn.values, case.space)
     for block, block_name in enumerate(found):
         place = block_name == "place"

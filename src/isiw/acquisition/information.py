@@ -6,7 +6,6 @@ it (stepwise uncertainty reduction for excursion sets [Bect2012; Chevalier2014])
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, ClassVar, Protocol
@@ -17,7 +16,7 @@ from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import Checked, can, whole
 from isiw.models.protocol import (
     CountsPairs,
-    ForeseesOutcomes,
+    ForeseesReductions,
     Posterior,
     PredictsOutcomes,
     SamplesDepression,
@@ -35,13 +34,6 @@ def _entropy(mass: Array) -> Array:
     # Probabilities that are practically 0 add practically nothing.
     entropy: Array = -(np.log(np.maximum(mass, 1e-30)) * mass).sum(-1)
     return entropy
-
-
-def _foreseen(posterior: PredictsOutcomes, isi_ms: Array) -> Iterable[Singles | engine.Foreseen]:
-    """Distributions of each person's next MEP, as the engine takes them."""
-    if can(posterior, ForeseesOutcomes):
-        return posterior.foreseen(isi_ms)
-    return _for_the_engine(posterior.outcome_mass(isi_ms))
 
 
 def _for_the_engine(values: Array) -> Singles:
@@ -72,7 +64,10 @@ class MutualInformation:
 
     def __call__(self, posterior: PredictsOutcomes, isi_ms: Array) -> Array:
         """The information [nat], shape (b, t)."""
-        return np.stack([engine.entropy_reductions(each) for each in _foreseen(posterior, isi_ms)])
+        if can(posterior, ForeseesReductions):
+            return posterior.reductions(isi_ms, of_window=False)
+        mass = _for_the_engine(posterior.outcome_mass(isi_ms))
+        return np.stack([engine.reductions(each, each[:, 0, :0]) for each in mass])
 
 
 @dataclass(frozen=True)
@@ -110,11 +105,13 @@ class WindowGain:
 
     def __call__(self, posterior: ForeseesWindows, isi_ms: Array) -> Array:
         """Expected reduction of the summed variance of membership, shape (b, t)."""
+        if can(posterior, ForeseesReductions):
+            return posterior.reductions(isi_ms, of_window=True)
         masks = posterior.window_masks(isi_ms)
         if can(posterior, SamplesDepression):
             masks = np.concatenate((masks, posterior.depressed_masks(isi_ms)), axis=-1)
-        people = zip(_foreseen(posterior, isi_ms), _for_the_engine(masks), strict=True)
-        return np.stack([engine.variance_reductions(each, inside) for each, inside in people])
+        people = zip(*map(_for_the_engine, (posterior.outcome_mass(isi_ms), masks)), strict=True)
+        return np.stack([engine.reductions(mass, inside) for mass, inside in people])
 
 
 @dataclass(frozen=True)

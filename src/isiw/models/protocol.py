@@ -11,9 +11,9 @@ the same order and equally weighted.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.types import Array, ArrayLike, FloatArray, Singles
 from isiw.window import Window
-
-if TYPE_CHECKING:
-    from isiw.native.engine import Foreseen
 
 Values: TypeAlias = Array | Sequence[float | None] | Sequence[bool | None]
 """One value a person, as an array or plain; None is not known."""
@@ -133,11 +130,17 @@ class PredictsOutcomes(Protocol):
 
 
 @runtime_checkable
-class ForeseesOutcomes(Protocol):
-    """Capability: the same distributions, a person at a time, as a compiled engine reads them."""
+class ForeseesReductions(Protocol):
+    """Capability: how much the next MEP is expected to tell, by the same distributions without handing them out."""
 
-    def foreseen(self, isi_ms: Array) -> Iterator[Foreseen]:
-        """Distributions of each person's next MEP at candidate ISIs [ms] (t,)."""
+    def reductions(self, isi_ms: Array, *, of_window: bool) -> Array:
+        """The expected reduction of what is unknown, shape (b, t).
+
+        Args:
+            isi_ms: candidate ISIs [ms], shape (t,).
+            of_window: the summed variance of each ISI's membership in the window, or in a depression; otherwise the
+                entropy of all unknowns [nat].
+        """
 
 
 @runtime_checkable

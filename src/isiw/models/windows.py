@@ -8,13 +8,14 @@ from functools import cache, cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from isiw.design import DesignSpace
 from isiw.estimate import Enhancement, Magnitude, WindowEstimate
 from isiw.excess import least_excess_mv
 from isiw.figures import BestISI
 from isiw.lazy import Later
-from isiw.native.engine import expected_f1
+from isiw.native.engine import best_window
 from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
 from isiw.window import Window
 
@@ -29,15 +30,17 @@ EXCLUDED_AT = 0.9
 """With which probability `WindowEstimate.largest_excluded` is larger than the largest enhancement."""
 
 
+CUTS: Final = np.linspace(0.1, 0.9, 17)
+"""Level sets of the membership that may be reported, as shares of the largest, (cuts,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Sampled windows as runs of ISIs next to each other, sample by sample."""
+    """Sampled windows as runs of ISIs next to each other."""
 
-    sample: IntArray  # which sample each run is of, ascending, (r,)
-    first: IntArray  # index of its first ISI, (r,)
-    behind: IntArray  # index behind its last, (r,)
-    samples: int
+    pairs: NDArray[np.int32]  # of each index of its first ISI, and behind its last; 0 where there is none, (s, k, 2)
     points: int  # how many ISIs
+    told: tuple[BoolArray, float] | None = None  # what `best` is, if that was worked out
 
     @classmethod
     def of_masks(cls, masks: Array) -> Runs:
@@ -47,62 +50,36 @@ class Runs:
         inside[:, 1:-1] = masks > 0
         steps = np.diff(inside, axis=-1)
         (sample, first), behind = np.nonzero(steps > 0), np.nonzero(steps < 0)[1]
-        return cls(sample, first, behind, samples, points)
-
-    @classmethod
-    def of_pairs(cls, pairs: IntArray, points: int) -> Runs:
-        """The runs of windows given as pairs of indices, shape (s, 2 k): of the first ISI, and behind the last."""
-        every = pairs.reshape(-1, 2)
-        runs = np.flatnonzero(every[:, 0] < every[:, 1])
-        first, behind = every.take(runs, axis=0).T
-        return cls(runs // (pairs.shape[1] // 2), first, behind, len(pairs), points)
-
-    @cached_property
-    def _leads(self) -> IntArray:
-        """The first run of each window, shape (w,)."""
-        others = np.ones(len(self.sample), dtype=bool)
-        np.not_equal(self.sample[1:], self.sample[:-1], out=others[1:])
-        return np.flatnonzero(others)
+        number = np.arange(len(sample)) - np.searchsorted(sample, sample)
+        pairs = np.zeros((samples, 1 + number.max(initial=0), 2), dtype=np.int32)
+        pairs[sample, number] = np.stack((first, behind), axis=-1)
+        return cls(pairs, points)
 
     @cached_property
     def found(self) -> IntArray:
         """The samples that have a window, shape (w,)."""
-        return self.sample[self._leads]
+        return np.flatnonzero(self.pairs[:, 0, 1])
 
     @cached_property
-    def hulls(self) -> tuple[IntArray, IntArray]:
+    def _own(self) -> NDArray[np.int32]:
+        """The runs of those, shape (w, k, 2)."""
+        return self.pairs.take(self.found, axis=0)
+
+    @cached_property
+    def hulls(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Index of the first and of the last ISI of each window, each of shape (w,)."""
-        lasts = np.append(self._leads[1:], len(self.sample))[: len(self._leads)] - 1
-        return self.first[self._leads], self.behind[lasts] - 1
-
-    def summed(self, values: FloatArray) -> FloatArray:
-        """Sum of what each window has at its runs (r, ...), shape (w, ...)."""
-        if len(self._leads) == len(values):  # each has one
-            return values
-        return np.add.reduceat(values, self._leads, axis=0)
-
-    @cached_property
-    def sizes(self) -> FloatArray:
-        """Number of ISIs of each window, shape (w,)."""
-        return self.summed((self.behind - self.first).astype(float))
+        return self._own[:, 0, 0], self._own[:, :, 1].max(-1) - 1
 
     @property
-    def membership(self) -> FloatArray:
-        """The share of the windows that holds each ISI, shape (t,)."""
-        steps = [np.bincount(ends, minlength=self.points + 1) for ends in (self.first, self.behind)]
-        return np.cumsum(steps[0] - steps[1])[:-1] / max(1, len(self._leads))
+    def sizes(self) -> IntArray:
+        """Number of ISIs of each window, shape (w,)."""
+        sizes: IntArray = (self._own[..., 1] - self._own[..., 0]).sum(-1)
+        return sizes
 
-
-_LEVELS: Final = np.linspace(0.1, 0.9, 17)
-
-
-def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, float]:
-    """The window of largest expected F1 among the level sets of the posterior's membership, and that F1."""
-    membership = windows.membership
-    candidates = membership >= _LEVELS[:, np.newaxis] * membership.max()
-    f1 = expected_f1(candidates, windows.sample, windows.first, windows.behind)
-    best = int(f1.argmax())
-    return Window.from_mask(grid_ms, candidates[best]), float(f1[best])
+    @property
+    def best(self) -> tuple[BoolArray, float]:
+        """The set of ISIs of largest expected F1 among the level sets of the membership, (t,), and that F1."""
+        return best_window(self.pairs, self.points, CUTS) if self.told is None else self.told
 
 
 def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:
@@ -160,12 +137,13 @@ def sampled_estimate(
     most_probable: float = 1.0,
 ) -> WindowEstimate:
     """The estimate of the window of one person by equally weighted samples, at most so probable."""
-    probability = min(len(windows.found) / windows.samples, most_probable)
+    probability = min(len(windows.found) / len(windows.pairs), most_probable)
     first, last = windows.hulls
     edges = edge_samples(windows, space)
     middle = (len(edges) - 1) // 2
     start, end = np.sort(edges, axis=0)[middle].tolist() if len(edges) else (None, None)
-    reported, f1 = best_window(windows, space.grid_ms) if probability >= 0.5 else (None, 1.0)
+    inside, f1 = windows.best if probability >= 0.5 else (None, 1.0)
+    reported = None if inside is None else Window.from_mask(space.grid_ms, inside)
     profiles = cache(profiles)
     return WindowEstimate(
         probability=probability,

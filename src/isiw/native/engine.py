@@ -8,21 +8,22 @@ from __future__ import annotations
 import ctypes
 import os
 import platform
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from isiw.errors import InvalidValueError, IsiwError
 from isiw.native.sources import digest
-from isiw.types import BoolArray, FloatArray, IntArray, Singles
+from isiw.types import BoolArray, FloatArray, Singles
 
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
 
-VERSION: Final = 7
+VERSION: Final = 8
 """Of the engine: it grows if the same draws come to other numbers."""
 
 _LONGEST: Final = 200
@@ -48,9 +49,10 @@ UNKNOWN: Final = np.float32(1e30)
 """In place of the log density of a block that was not worked out yet."""
 
 SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
-WHOLE, NATURAL, FLAG = np.dtype(np.int64), np.dtype(np.uint64), np.dtype(np.bool_)
+WHOLE, NATURAL, FLAG, PLACE = np.dtype(np.int64), np.dtype(np.uint64), np.dtype(np.bool_), np.dtype(np.int32)
 
 Seeds: TypeAlias = NDArray[np.uint64]
+_Shape: TypeAlias = tuple[int, ...]
 
 
 _FILES: Final = {"Darwin": "_engine.dylib", "Windows": "_engine.dll"}
@@ -72,14 +74,15 @@ _SIGNATURES: Final = {
     "draws": "annaaa",
     "sweeps": "annnaaaaaaaa",
     "evoked_means": "nnaaa",
-    "outcome_tables": "nnnnnaaaaa",
+    "outcome_tables": "nnnnnaaaaaa",
     "rows_between": "nnnnaaaa",
     "facilitations": "nnaaa",
     "edge_levels": "nnnsaaaa",
     "window_runs": "nnaaaa",
-    "expected_f1": "nnnaaaaa",
-    "entropy_reductions": "nnnnaaaa",
-    "variance_reductions": "nnnnnaaaaa",
+    "best_window": "nnnnaaaa",
+    "reductions": "nnnnaaa",
+    "ask": "aannnnsdnaaaaaa",
+    "estimate": "annnnaaaaaaaa",
     "elementary": "snaaa",
 }
 """The functions in the order of `Engine` in engine.h, and what they take: numbers, and arrays."""
@@ -205,13 +208,19 @@ def require_built_of(library: ctypes.CDLL, folder: Path) -> None:
         )
 
 
+def _made(name: str, sizes: Sequence[int], given: Sequence[tuple[Singles, _Shape]], *shapes: _Shape) -> list[Singles]:
+    """What a function makes of sizes and of arrays, which must have some shapes: arrays of some shapes."""
+    found = [np.empty(shape, dtype=SINGLE) for shape in shapes]
+    arrays = (*given, *zip(found, shapes, strict=True))
+    call(name, *sizes, *(address(array, SINGLE, *shape) for array, shape in arrays))
+    return found
+
+
 def log_likelihoods(fields: Singles, columns: Singles) -> Singles:
     """Log likelihood of each person's trials (b, n, columns) under each particle (b, p, fields), (b, p)."""
     (people, particles, _), trials = fields.shape, columns.shape[1]
-    found = np.empty((people, particles), dtype=SINGLE)
-    told = address(columns, SINGLE, people, trials, COLUMNS)
-    call("likelihoods", people, particles, trials, _fields(fields), told, address(found, SINGLE, *found.shape))
-    return found
+    given = _fields(fields), (columns, (people, trials, COLUMNS))
+    return _made("likelihoods", (people, particles, trials), given, (people, particles))[0]
 
 
 def evoked_means(fields: Singles, rows: int) -> tuple[Singles, Singles]:
@@ -219,56 +228,42 @@ def evoked_means(fields: Singles, rows: int) -> tuple[Singles, Singles]:
 
     Rows are at squares of equal steps, or where there is a depression at equal steps from below 0.
     """
-    levels, means = (np.empty((*fields.shape[:2], _rows(rows)), dtype=SINGLE) for _ in range(2))
-    arrays = address(levels, SINGLE, *levels.shape), address(means, SINGLE, *means.shape)
-    call("evoked_means", _samples(fields), rows, _fields(fields), *arrays)
+    shape = *fields.shape[:2], _rows(rows)
+    levels, means = _made("evoked_means", (_samples(fields), rows), [_fields(fields)], shape, shape)
     return levels, means
 
 
-def outcome_tables(fields: Singles, levels: Singles, order: int, log_mep: Singles, widths: Singles) -> Singles:
-    """Probability of each outcome of the next trial, (b, s, l, y).
+def outcome_tables(
+    fields: Singles, levels: Singles, means: Singles, order: int, cells: Singles
+) -> tuple[Singles, Singles]:
+    """Between which log MEPs outcomes of the next trial lie, (b, 2), and the probability of each, (b, s, l, y).
 
     Args:
         fields: the particles, (b, s, fields).
         levels: facilitations of the rows, (b, s, l).
+        means: expected MEPs above the floor there, in floors, likewise.
         order: how many trials came before.
-        log_mep: middles of the outcomes, log mV, (b, y).
-        widths: of the outcomes, in any unit, (y,).
+        cells: ends of the outcomes, as shares of what lies between the log MEPs, (y + 1,).
     """
-    (people, samples, rows), outcomes = levels.shape, len(widths)
-    table = np.empty((people, samples, rows, outcomes), dtype=SINGLE)
-    cells = address(log_mep, SINGLE, people, outcomes), address(widths, SINGLE, outcomes)
-    at = address(levels, SINGLE, *fields.shape[:2], rows)
-    found = address(table, SINGLE, *table.shape)
-    call("outcome_tables", people, samples, rows, outcomes, order, _fields(fields), at, *cells, found)
-    return table
+    of, outcomes = fields.shape[:2], len(cells) - 1
+    rows = *of, levels.shape[2]
+    given = _fields(fields), (levels, rows), (means, rows), (cells, (outcomes + 1,))
+    sizes = *rows, outcomes, order
+    ends, table = _made("outcome_tables", sizes, given, (of[0], 2), (*rows, outcomes))
+    return ends, table
 
 
 def rows_between(fields: Singles, table: Singles, levels: Singles) -> Singles:
     """What lies between the rows of tables (b, s, l, y) at facilitations (b, s, t), (b, s, t, y)."""
-    rows, outcomes, isis = table.shape[2], table.shape[3], levels.shape[2]
-    found = np.empty((*levels.shape, outcomes), dtype=SINGLE)
-    of = fields.shape[:2]
-    arrays = address(table, SINGLE, *of, _rows(rows), outcomes), address(levels, SINGLE, *of, isis)
-    call(
-        "rows_between",
-        _samples(fields),
-        rows,
-        isis,
-        outcomes,
-        _fields(fields),
-        *arrays,
-        address(found, SINGLE, *found.shape),
-    )
-    return found
+    of, (rows, outcomes), isis = fields.shape[:2], table.shape[2:], levels.shape[2]
+    given = _fields(fields), (table, (*of, _rows(rows), outcomes)), (levels, (*of, isis))
+    return _made("rows_between", (_samples(fields), rows, isis, outcomes), given, (*of, isis, outcomes))[0]
 
 
 def facilitations(fields: Singles, isi_ms: Singles) -> Singles:
     """Facilitation of each particle at some ISIs [ms] (t,), (b, s, t)."""
-    found = np.empty((*fields.shape[:2], len(isi_ms)), dtype=SINGLE)
-    at = address(isi_ms, SINGLE, len(isi_ms))
-    call("facilitations", _samples(fields), len(isi_ms), _fields(fields), at, address(found, SINGLE, *found.shape))
-    return found
+    given, isis = (_fields(fields), (isi_ms, (len(isi_ms),))), len(isi_ms)
+    return _made("facilitations", (_samples(fields), isis), given, (*fields.shape[:2], isis))[0]
 
 
 def edge_levels(fields: Singles, evoked: Singles, isi_ms: Singles, *, fine: bool) -> Singles:
@@ -280,99 +275,53 @@ def edge_levels(fields: Singles, evoked: Singles, isi_ms: Singles, *, fine: bool
         isi_ms: ascending ISIs [ms], (t,).
         fine: whether the largest facilitation is that of all of their range, not of these ISIs alone.
     """
-    rows, found = evoked.shape[2], np.empty(fields.shape[:2], dtype=SINGLE)
-    if not len(isi_ms):
+    of, rows, isis = fields.shape[:2], evoked.shape[2], len(isi_ms)
+    if not isis:
         raise ValueError("windows are looked for at some ISIs")
-    arrays = address(evoked, SINGLE, *fields.shape[:2], _rows(rows)), address(isi_ms, SINGLE, len(isi_ms))
-    at = address(found, SINGLE, *found.shape)
-    call("edge_levels", _samples(fields), rows, len(isi_ms), fine, _fields(fields), *arrays, at)
-    return found
+    given = _fields(fields), (evoked, (*of, _rows(rows))), (isi_ms, (isis,))
+    return _made("edge_levels", (_samples(fields), rows, isis, fine), given, of)[0]
 
 
 def window_runs(fields: Singles, levels: Singles, isi_ms: Singles) -> NDArray[np.int32]:
     """Which ISIs are in each particle's window, as two runs of indices (first, behind the last), (b, s, 4) int32."""
-    runs = np.empty((*levels.shape, 4), dtype=np.int32)
+    runs = np.empty((*levels.shape, 4), dtype=PLACE)
     arrays = address(levels, SINGLE, *fields.shape[:2]), address(isi_ms, SINGLE, len(isi_ms))
-    at = address(runs, runs.dtype, *runs.shape)
-    call("window_runs", _samples(fields), len(isi_ms), _fields(fields), *arrays, at)
+    of, at = address(fields, SINGLE, *fields.shape[:2], FIELDS), address(runs, PLACE, *runs.shape)
+    call("window_runs", _samples(fields), len(isi_ms), of, *arrays, at)
     return runs
 
 
-def expected_f1(sets: BoolArray, sample: IntArray, first: IntArray, behind: IntArray) -> FloatArray:
-    """Expected F1 of sets of ISIs (c, t) with sampled windows, (c,).
+def best_window(pairs: NDArray[np.int32], points: int, shares: FloatArray) -> tuple[BoolArray, float]:
+    """The set of ISIs (t,) of largest expected F1 with sampled windows, and this F1.
 
     Args:
-        sets: which ISIs each set has.
-        sample: the sample that each run of ISIs next to each other is of, ascending, (r,).
-        first: index of its first ISI, (r,).
-        behind: index behind its last, (r,).
+        pairs: index of the first ISI of each run of a window, and behind its last, (s, k, 2).
+        points: how many ISIs.
+        shares: the sets are those in at least such a share of as many windows as any ISI is in, (cuts,).
     """
-    runs, found = len(sample), np.empty(len(sets), dtype=DOUBLE)
-    if not runs or first.min() < 0 or (first > behind).any() or behind.max() > sets.shape[1]:
+    samples, runs, _ = pairs.shape
+    if not runs or pairs.min(initial=0) < 0 or (pairs[..., 0] > pairs[..., 1]).any() or pairs.max(initial=0) > points:
         raise ValueError("windows are runs of the ISIs")
-    side_by_side = [np.ascontiguousarray(array) for array in (sample, first, behind)]
-    arrays = address(sets, FLAG, *sets.shape), *(address(array, WHOLE, runs) for array in side_by_side)
-    call("expected_f1", *sets.shape, runs, *arrays, address(found, DOUBLE, len(sets)))
-    return found
+    inside, f1 = np.empty(points, dtype=FLAG), np.empty(1, dtype=DOUBLE)
+    arrays = address(pairs, PLACE, samples, runs, 2), address(shares, DOUBLE, len(shares))
+    found = address(inside, FLAG, points), address(f1, DOUBLE, 1)
+    call("best_window", samples, runs, points, len(shares), *arrays, *found)
+    return inside, f1.item()
 
 
-class Foreseen(NamedTuple):
-    """Distributions of one person's next outcome at some ISIs: they lie between the rows of tables."""
+def reductions(mass: Singles, masks: Singles) -> Singles:
+    """Entropy of the mean of one person's distributions (s, t, y), less their mean entropy [nat], (t,).
 
-    fields: Singles  # the samples, (1, s, fields)
-    table: Singles  # distributions in the rows, (1, s, l, y)
-    levels: Singles  # facilitations at the ISIs, (1, s, t)
-
-
-def entropy_reductions(foreseen: Singles | Foreseen) -> Singles:
-    """Entropy of the mean of one person's distributions, (s, t, y) or foreseen, less their mean entropy [nat], (t,)."""
-    sizes, arrays = _foreseen(foreseen)
-    found = np.empty(sizes[2], dtype=SINGLE)
-    call("entropy_reductions", *sizes, *arrays, address(found, SINGLE, *found.shape))
-    return found
-
-
-def variance_reductions(foreseen: Singles | Foreseen, masks: Singles) -> Singles:
-    """Variance of each ISI's membership in one person's windows (s, g) less that after an outcome, summed, (t,).
-
-    Distributions of the outcome are (s, t, y), or foreseen. Sampled windows are runs of ISIs, so that what changes from
-    one ISI to the next is summed instead of all of them.
+    With windows (s, points) instead the variance of each point's membership, less that after an outcome, summed.
+    Sampled windows are runs of ISIs, so that what changes from one ISI to the next is summed instead of all of them.
     """
-    sizes, arrays = _foreseen(foreseen)
-    points, found = masks.shape[1], np.empty(sizes[2], dtype=SINGLE)
-    inside = address(masks, SINGLE, sizes[0], points)
-    call("variance_reductions", *sizes, points, *arrays, inside, address(found, SINGLE, *found.shape))
-    return found
+    (samples, isis, outcomes), points = mass.shape, masks.shape[1]
+    given = (mass, mass.shape), (masks, (samples, points))
+    return _made("reductions", (samples, isis, outcomes, points), given, (isis,))[0]
 
 
-def _foreseen(foreseen: Singles | Foreseen) -> tuple[tuple[int, int, int, int], tuple[int, int, int]]:
-    """Samples, rows, ISIs and outcomes, and where fields, table and facilitations begin."""
-    if not isinstance(foreseen, Foreseen):
-        samples, isis, outcomes = foreseen.shape
-        mass = address(foreseen, SINGLE, *foreseen.shape)
-        return (samples, 0, isis, outcomes), (mass, mass, mass)
-    fields, table, levels = foreseen
-    (_, samples, rows, outcomes), isis = table.shape, levels.shape[2]
-    arrays = address(fields, SINGLE, 1, samples, FIELDS), address(table, SINGLE, 1, samples, _rows(rows), outcomes)
-    return (samples, rows, isis, outcomes), (*arrays, address(levels, SINGLE, 1, samples, isis))
-
-
-ELEMENTARY: Final = ("exp", "exp2", "log", "per", "per_root", "between")
-
-
-def elementary(name: str, x: Singles, y: Singles | None = None) -> Singles:
-    """One of the elementary functions that the engine is made of, of some numbers (n,); for tests.
-
-    `between` is the probability that a standard normal variable is between x and y.
-    """
-    found = np.empty(len(x), dtype=SINGLE)
-    arrays = (address(array, SINGLE, len(x)) for array in (x, x if y is None else y, found))
-    call("elementary", ELEMENTARY.index(name), len(x), *arrays)
-    return found
-
-
-def _fields(fields: Singles) -> int:
-    return address(fields, SINGLE, *fields.shape[:2], FIELDS)
+def _fields(fields: Singles) -> tuple[Singles, _Shape]:
+    return fields, (*fields.shape[:2], FIELDS)
 
 
 def _samples(fields: Singles) -> int:

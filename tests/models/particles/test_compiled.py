@@ -9,7 +9,8 @@ import pytest
 
 from isiw.models.particles import jumps
 from isiw.models.particles.compiled import Law, Tables
-from isiw.native.engine import expected_f1
+from isiw.models.windows import CUTS
+from isiw.native.engine import best_window
 from native.drawn import CASES
 
 
@@ -62,8 +63,13 @@ def test_latents_that_moves_write_or_compare_are_there(tables: Tables, meaning: 
         Law(tables._replace(at=at, **changed))
 
 
-@pytest.mark.parametrize(("first", "behind"), [([-1], [2]), ([2], [1]), ([0], [4]), ([], [])])
-def test_windows_beyond_the_isis_are_refused(first: list[int], behind: list[int]) -> None:
-    inside, runs = np.ones((1, 3), dtype=bool), (np.array(each, dtype=np.int64) for each in (first, first, behind))
+@pytest.mark.parametrize("pairs", [[[-1, 2]], [[2, 1]], [[0, 4]], []])
+def test_windows_beyond_the_isis_are_refused(pairs: list[list[int]]) -> None:
     with pytest.raises(ValueError, match="runs of the ISIs"):
-        expected_f1(inside, *runs)
+        best_window(np.array(pairs, dtype=np.int32).reshape(1, -1, 2), 3, CUTS)
+
+
+@pytest.mark.parametrize("missing", [{"rows": 1}, {"cells": np.zeros(1)}, {"grid_ms": np.zeros(0)}])
+def test_tables_of_predictions_have_rows_outcomes_and_isis(tables: Tables, missing: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="beyond themselves"):
+        Law(tables._replace(**missing))

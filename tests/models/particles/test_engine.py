@@ -31,10 +31,10 @@ from isiw.models.particles.records import (
 from isiw.models.protocol import Observation
 from isiw.models.shared.draws import systematic
 from isiw.models.shared.history import COUNTS, Circumstances, History, neutral
-from isiw.native.engine import UNKNOWN, elementary, log_likelihoods
+from isiw.native.engine import UNKNOWN, log_likelihoods
 from isiw.types import FloatArray, Singles
 from native import reference
-from native.drawn import CASES, Case, columns, history, seeds, trials
+from native.drawn import CASES, Case, columns, elementary, history, seeds, sweeps, trials
 
 KINDS = {kind.name: kind for kind in NoiseKind}
 
@@ -53,7 +53,7 @@ def moved(case: Case, latents: Latents, told: History, numbers: Sequence[int], s
     values, kinds = latents.values.copy(), latents.kinds.copy()
     log_likelihood = log_likelihoods(case.fields(latents), told.columns)
     state = values, kinds, log_likelihood, case.law.nothing_known(people, particles)
-    counts = case.law.sweeps(np.array(numbers), told.columns, seeds(seed, people), state)
+    counts = sweeps(case.law, np.array(numbers), told.columns, seeds(seed, people), state)
     return Latents(values, kinds), log_likelihood, counts
 
 
@@ -171,7 +171,9 @@ def test_only_those_whose_particles_have_worn_out_are_resampled() -> None:
 def test_weighted_particles_are_represented_by_evenly_spaced_picks() -> None:
     case, rng = CASES["default"], np.random.default_rng(8)
     latents, log_weights = case.drawn(300, 8, people=2), 3.0 * rng.standard_normal((2, 300))
-    picks, fields = case.law.represent(*latents, log_weights, 70, 9)
+    nothing = np.zeros((2, 300), dtype=np.float32)
+    crowd = Crowd(*latents, log_weights, nothing, case.law.nothing_known(2, 300))
+    picks, fields = case.law.represent(crowd, 70, 9)
     np.testing.assert_array_equal(picks, systematic(log_weights, 70))
     meant = case.fields(latents, 9)
     np.testing.assert_array_equal(fields, np.take_along_axis(meant, picks[..., np.newaxis], axis=1))
@@ -284,7 +286,7 @@ def test_sweeps_one_by_one_lead_where_sweeps_at_once_do(name: str) -> None:
         dice, counts = np.full(1, 7, dtype=np.uint64), np.zeros((1, 4), dtype=np.float32)
         for _ in range(calls):
             state = values, kinds, log_likelihood, case.law.nothing_known(1, 300)
-            counts += case.law.sweeps(np.array([number]), told.columns, dice, state)
+            counts += sweeps(case.law, np.array([number]), told.columns, dice, state)
         found.append((values, kinds, log_likelihood, counts))
     for together, one_by_one in zip(*found, strict=True):
         np.testing.assert_array_equal(together, one_by_one)

@@ -38,7 +38,7 @@ from isiw.subjects.subject import SimulatedSubject
 from isiw.types import FloatArray
 from isiw.window import Window
 from known import known
-from native.drawn import Case, seeds
+from native.drawn import Case, seeds, sweeps
 
 GRID = np.arange(0.0, 501.0, 5.0)
 
@@ -160,7 +160,7 @@ def test_moves_that_learn_nothing_leave_the_prior_as_it_is() -> None:
     nothing = neutral(3)[np.newaxis]
     nothing[..., 2], nothing[..., 3] = -np.inf, np.inf
     state = *latents, np.zeros((1, 8000), dtype=np.float32), case.law.nothing_known(1, 8000)
-    counts = case.law.sweeps(np.array([20]), nothing, seeds(2), state)
+    counts = sweeps(case.law, np.array([20]), nothing, seeds(2), state)
     assert 0.05 < counts[0, 1] / counts[0, 0] < 1
     assert counts[0, 3] / counts[0, 2] > 0.8
     for quantile in (0.1, 0.5, 0.9):

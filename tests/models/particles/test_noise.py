@@ -160,10 +160,11 @@ def test_the_density_integrates_to_one(modelled: Singles, level: float) -> None:
 
 @pytest.mark.parametrize("modelled", [pair[0] for pair in PAIRS])
 def test_the_density_of_a_trial_is_that_of_the_outcome_in_a_table(modelled: Singles) -> None:
-    log_mep = np.log([0.008, 0.02, 0.05, 0.2])
-    levels, _ = engine.evoked_means(modelled, LEVELS)
-    cells = log_mep[np.newaxis].astype(np.float32), np.ones(4, dtype=np.float32)
-    table = engine.outcome_tables(modelled, levels, LATER, *cells)[0, 0]
+    cells = np.array([0.0, 0.2, 0.4, 0.6, 0.8], dtype=np.float32)
+    levels, means = engine.evoked_means(modelled, LEVELS)
+    ends, tables = engine.outcome_tables(modelled, levels, means, LATER, cells)
+    (low, high), table = ends[0].astype(float).tolist(), tables[0, 0]
+    log_mep = low + 0.5 * (cells[1:] + cells[:-1]) * (high - low)
     for row in (1, 9, LEVELS - 1):
         by_trial = densities(modelled, float(levels[0, 0, row]), log_mep)
         np.testing.assert_allclose(table[row], by_trial / by_trial.sum(), rtol=2e-3, atol=1e-5)

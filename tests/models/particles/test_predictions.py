@@ -7,12 +7,15 @@ from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.excess import window_from_excess
 from isiw.metrics import f1
 from isiw.models.particles.model import ParticleModel
-from isiw.models.particles.predictions import PersonSample, _quantile, drawn_mep_mv
+from isiw.models.particles.predictions import PersonSample, drawn_mep_mv
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
+from isiw.models.particles.records import LOG_FLOOR
 from isiw.models.protocol import Observation
+from isiw.models.shared.draws import LEVELS
 from isiw.models.shared.start import StartPrior
-from isiw.models.windows import grid_of, profile_grid
+from isiw.models.windows import Runs, grid_of, profile_grid
+from isiw.native import engine
 from isiw.window import Window
 from native.drawn import Case
 
@@ -43,6 +46,23 @@ def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(s
     assert np.quantile(scores[scores > 0], 0.01) > 0.98
 
 
+def test_one_call_finds_the_windows_of_the_particles_that_stand_for_a_persons() -> None:
+    posterior = ParticleModel(particles=300).begin(VALVE_SPACE, 3, people=2)
+    for person in (0, 1):
+        picks, windows = posterior.law.estimate(posterior.swarm.crowd.of_person(person), 200, 0)
+        latents, fields = posterior.swarm.picked(posterior.law, 200, person)
+        np.testing.assert_array_equal(posterior.swarm.latents.values[person][picks], latents.values)
+        masks = PersonSample(fields, VALVE_SPACE).window_masks(grid_of(VALVE_SPACE))[0]
+        np.testing.assert_array_equal(windows.found, np.flatnonzero(masks.any(-1)))
+        np.testing.assert_array_equal(windows.sizes, masks[windows.found].sum(-1))
+        inside, f1 = Runs.of_masks(masks).best
+        np.testing.assert_array_equal(windows.best[0], inside)
+        assert windows.best[1] == f1
+    for nobody in (posterior.swarm.crowd, posterior.swarm.crowd.of_person(2)):
+        with pytest.raises(ValueError, match="one person"):
+            posterior.law.estimate(nobody, 200, 0)
+
+
 @pytest.mark.slow
 def test_nine_of_ten_meps_of_people_in_general_lie_in_the_predicted_band() -> None:
     model = ParticleModel(particles=2000, thinned=1000)
@@ -61,10 +81,14 @@ def test_each_person_of_a_batch_has_a_band_of_its_own() -> None:
     assert (small_mv < large_mv).all()
 
 
-@pytest.mark.parametrize("share", [0.05, 0.5, 0.95, 1.0])
-def test_a_quantile_of_particles_is_that_of_numpy(share: float) -> None:
-    values = np.random.default_rng(1).standard_normal((2, 192)).astype(np.float32)
-    np.testing.assert_allclose(_quantile(values, share), np.quantile(values, share, axis=-1), rtol=1e-5)
+@pytest.mark.parametrize("samples", [1, 2, 20, 41, 192])
+def test_outcomes_reach_from_below_the_floor_to_above_the_largest_meps(samples: int) -> None:
+    case = Case(Prior(), VALVE_SPACE)
+    fields = np.concatenate([case.fields(case.drawn(samples, seed)) for seed in (1, 2)])
+    log_floor, evoked = fields[..., LOG_FLOOR], engine.evoked_means(fields, LEVELS)[1]
+    low = np.quantile(log_floor, 0.05, axis=-1) - 1.0
+    high = np.quantile(log_floor + np.log1p(evoked.max(-1)), 0.95, axis=-1) + 1.5
+    np.testing.assert_allclose(PersonSample(fields, VALVE_SPACE).outcomes[0], np.stack((low, high), axis=-1), rtol=1e-5)
 
 
 def test_meps_are_drawn_as_often_below_a_quantile_as_it_says() -> None:

@@ -11,7 +11,10 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.models.particles.compiled import Tables
 from isiw.models.particles.mixture import Mixture
+from isiw.models.particles.predictions import CELLS, FINE_MS
+from isiw.models.shared.draws import LEVELS
 from isiw.models.shared.start import StartPrior
+from isiw.models.windows import grid_of
 from isiw.native.engine import MEANINGS
 from isiw.types import FloatArray, Singles
 
@@ -62,6 +65,7 @@ def prior_tables(
     law |= {"means": means, "sds": sds, "per_sds": 1.0 / sds}
     law |= {"first": np.array(first), "size": np.array(size), "components": np.array(components)}
     law |= dict(zip(("start_ms", "density", "quantiles"), start.knots(space)[:3], strict=True)) | _of_places(places)
+    law |= {"grid_ms": grid_of(space), "cells": CELLS, "rows": LEVELS, "fine": space.step_ms <= FINE_MS}
     made = moves | {"changed": int(np.searchsorted(law["first"], where[27]))}
     made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
     made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}

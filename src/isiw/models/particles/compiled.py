@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from isiw.models.windows import CUTS, Runs
 from isiw.native.engine import (
     COLUMNS,
     DOUBLE,
@@ -17,6 +18,7 @@ from isiw.native.engine import (
     LANES,
     MEANINGS,
     NATURAL,
+    PLACE,
     SINGLE,
     UNKNOWN,
     WHOLE,
@@ -49,8 +51,19 @@ class Crowd(NamedTuple):
 
     def copied(self) -> Crowd:
         """The same, to be changed."""
-        log_weights, log_likelihood = self.log_weights.copy(), self.log_likelihood.copy()
-        return Crowd(self.values.copy(), self.kinds.copy(), log_weights, log_likelihood, self.densities.copy())
+        return Crowd._make(each.copy() for each in self)
+
+    def of_person(self, person: int) -> Crowd:
+        """The particles of one person, fields of shape (1, p)."""
+        return Crowd._make(each[person : person + 1] for each in self)
+
+
+class Asking(NamedTuple):
+    """About what ISIs are scored, and how."""
+
+    of_window: bool = False  # about the window alone
+    usual: Law | None = None  # the prior that particles are weighed by, where it is not their own
+    stronger_pct_rmt: float = 0.0  # by how much the next pulse is stronger than the pairs'
 
 
 class Tables(NamedTuple):
@@ -83,20 +96,24 @@ class Tables(NamedTuple):
     renewed: BoolArray  # which kinds each jump draws again, (jumps, kinds)
     of_profile: BoolArray  # the jump concerns nothing but a profile, which without facilitation means nothing, (jumps,)
     kinds: Array  # sums of the probabilities of earlier values of each kind, (kinds, v - 1)
+    grid_ms: Array  # ISIs of the space [ms], ascending, (t,)
+    cells: Array  # where outcomes end, as shares of the range of the log MEP, (y + 1,)
     changed: int  # block of the latent that says when something changes; that of its size is the next
+    rows: int  # of tables by facilitation
+    fine: bool  # the ISIs are so close to each other that a window's peak is in all of their range
 
 
 class _Struct(ctypes.Structure):
     """`Tables` of engine.h."""
 
     _fields_ = [
-        *((name, ctypes.c_int64) for name in ("latents", "blocks", "width", "knots", "place_count")),
-        *((name, ctypes.c_int64) for name in ("states", "part_count", "jump_count", "kind_values")),
+        *((name, ctypes.c_int64) for name in ("latents", "blocks", "width", "knots", "place_count", "states")),
+        *((name, ctypes.c_int64) for name in ("part_count", "jump_count", "kind_values", "points", "outcomes")),
         *((name, ctypes.c_void_p) for name in Tables._fields[: Tables._fields.index("place_share")]),
         ("place_share", ctypes.c_float),
         ("apart", ctypes.c_int32),
-        *((name, ctypes.c_void_p) for name in Tables._fields[Tables._fields.index("state_of") : -1]),
-        ("changed", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in Tables._fields[Tables._fields.index("state_of") : -3]),
+        *((name, ctypes.c_int64) for name in Tables._fields[-3:]),
     ]
 
 
@@ -133,6 +150,8 @@ class Law:
             "renewed": (FLAG, (jumps, KINDS)),
             "of_profile": (FLAG, (jumps,)),
             "kinds": (SINGLE, (KINDS, values)),
+            "grid_ms": (SINGLE, (len(tables.grid_ms),)),
+            "cells": (SINGLE, (len(tables.cells),)),
         }
         with np.errstate(over="ignore"):
             self._arrays = {
@@ -140,12 +159,11 @@ class Law:
             }
         sizes = {"latents": latents, "blocks": blocks, "width": width, "knots": len(knots)}
         sizes |= {"place_count": len(tables.places), "states": states, "part_count": parts, "jump_count": jumps}
+        sizes |= {"points": len(tables.grid_ms), "outcomes": len(tables.cells) - 1, "kind_values": values}
+        numbers = {name: getattr(tables, name) for name in ("place_share", "apart", "changed", "rows", "fine")}
         self._struct = _Struct(
             **sizes,
-            kind_values=values,
-            place_share=tables.place_share,
-            apart=tables.apart,
-            changed=tables.changed,
+            **numbers,
             **{name: address(self._arrays[name], dtype, *shape) for name, (dtype, shape) in shapes.items()},
         )
         self.latents, self.blocks = latents, blocks
@@ -163,6 +181,7 @@ class Law:
             within = within and 0 <= changed < self.blocks - 1 and (at[_OF_A_CHANGE] < self.latents).all()
         if self._struct.apart:
             within = within and (at[_OF_A_DEPRESSION] < self.latents).all()
+        within = within and self._struct.points > 0 and self._struct.outcomes > 0 and self._struct.rows > 1
         if not within or knots < 2 or (_LAST_KINDS @ self._arrays["state_of"]) >= self._struct.states:
             raise ValueError("the tables of a prior point beyond themselves")
 
@@ -180,15 +199,49 @@ class Law:
 
     def usual_weights(self, usual: Law, crowd: Crowd) -> FloatArray:
         """Log weights of particles under another prior, which ISIs are chosen with, (b, p)."""
-        people, particles = self._require_particles(crowd.values, crowd.kinds)
-        found = np.empty((people, particles), dtype=DOUBLE)
+        of, (values, kinds, weights, _, known) = self._crowd(crowd)
+        found = np.empty(of, dtype=DOUBLE)
+        arrays = values, kinds, known, weights, address(found, DOUBLE, *of)
+        call("usual_weights", self._at, self._other(usual), *of, *arrays)
+        return found
+
+    def _other(self, usual: Law) -> int:
+        """Where another prior of the same particles is."""
         if usual.latents != self.latents or usual._struct.kind_values != self._struct.kind_values:
             raise ValueError("the other prior is of other latents or kinds")
-        arrays = self._values(crowd.values, crowd.kinds)
-        known = address(crowd.densities, SINGLE, people, particles, self.blocks + 1)
-        weights = address(crowd.log_weights, DOUBLE, people, particles), address(found, DOUBLE, people, particles)
-        call("usual_weights", self._at, usual._at, people, particles, *arrays, known, *weights)
+        return usual._at
+
+    def ask(self, crowd: Crowd, isi_ms: Singles, size: int, trials: int, how: Asking) -> Singles:
+        """How much the next trial, after so many, is expected to tell at some ISIs [ms] (t,), (b, t).
+
+        Args:
+            crowd: the particles.
+            isi_ms: the ISIs.
+            size: how many particles of equal weight stand for them.
+            trials: how many came before.
+            how: about what, by which prior, and at which intensity.
+        """
+        of, (values, kinds, weights, _, known) = self._crowd(crowd, least=1)
+        if size < 1:
+            raise ValueError("no particles stand for others")
+        isis, found = len(isi_ms), np.empty((of[0], len(isi_ms)), dtype=SINGLE)
+        arrays = values, kinds, known, weights, address(isi_ms, SINGLE, isis), address(found, SINGLE, of[0], isis)
+        usual = None if how.usual is None else self._other(how.usual)
+        sizes = *of, size, trials, how.of_window, how.stronger_pct_rmt, isis
+        call("ask", self._at, usual, *sizes, *arrays)
         return found
+
+    def estimate(self, crowd: Crowd, size: int, trials: int) -> tuple[IntArray, Runs]:
+        """Particles of equal weight that stand for one person's after so many trials: numbers (1, s), and windows."""
+        (people, particles), given = self._crowd(crowd, least=1)
+        if people != 1:
+            raise ValueError("one person is estimated at a time")
+        points, picks, runs = self._struct.points, np.empty((1, size), dtype=WHOLE), np.empty((size, 2, 2), dtype=PLACE)
+        best, f1 = np.empty(points, dtype=FLAG), np.empty(1, dtype=DOUBLE)
+        found = address(picks, WHOLE, 1, size), address(runs, PLACE, size, 2, 2), address(best, FLAG, points)
+        arrays = *given[:3], address(CUTS, DOUBLE, len(CUTS)), *found, address(f1, DOUBLE, 1)
+        call("estimate", self._at, particles, size, trials, len(CUTS), *arrays)
+        return picks, Runs(runs, points, (best, f1.item()))
 
     def learn(self, columns: Singles, min_ess: float, sweeps: tuple[int, int], dice: Seeds, crowd: Crowd) -> FloatArray:
         """Let particles learn the last of the trials, in place; what was found on the way, (b, 9).
@@ -205,40 +258,31 @@ class Law:
             accepted, jumps, and those that were accepted; the probabilities, before the trial, of amplitudes below its
             lower and its upper end times the weights of particles that predict it, and these weights, summed, (b, 9).
         """
-        people, particles = self._require_particles(crowd.values, crowd.kinds)
+        (people, particles), arrays = self._crowd(crowd, least=2)
         trials, found = columns.shape[1], np.empty((people, 9), dtype=DOUBLE)
-        if particles < 2 or not trials:
-            raise ValueError("particles move by differences of others, and learn from a trial")
-        call(
-            "learn",
-            self._at,
-            people,
-            particles,
-            trials,
-            address(columns, SINGLE, people, trials, COLUMNS),
-            min_ess,
-            *sweeps,
-            address(dice, NATURAL, people),
-            *self._values(crowd.values, crowd.kinds),
-            address(crowd.log_weights, DOUBLE, people, particles),
-            address(crowd.log_likelihood, SINGLE, people, particles),
-            address(crowd.densities, SINGLE, people, particles, self.blocks + 1),
-            address(found, DOUBLE, people, 9),
-        )
+        if not trials:
+            raise ValueError("particles learn from a trial")
+        told = address(columns, SINGLE, people, trials, COLUMNS)
+        arrays = address(dice, NATURAL, people), *arrays, address(found, DOUBLE, people, 9)
+        call("learn", self._at, people, particles, trials, told, min_ess, *sweeps, *arrays)
         return found
 
-    def represent(
-        self, values: Singles, kinds: IntArray, log_weights: FloatArray, size: int, trials: int
-    ) -> tuple[IntArray, Singles]:
+    def represent(self, crowd: Crowd, size: int, trials: int) -> tuple[IntArray, Singles]:
         """Equally weighted particles that stand for weighted ones: numbers (b, s), and fields after so many trials."""
-        people, particles = self._require_particles(values, kinds)
-        if not particles:
-            raise ValueError("nothing stands for no particles")
+        (people, particles), given = self._crowd(crowd, least=1)
         picks, fields = np.empty((people, size), dtype=WHOLE), np.empty((people, size, FIELDS), dtype=SINGLE)
-        weights = address(log_weights, DOUBLE, people, particles)
-        arrays = weights, address(picks, WHOLE, people, size), address(fields, SINGLE, *fields.shape)
-        call("represent", self._at, people, particles, size, trials, *self._values(values, kinds), *arrays)
+        arrays = *given[:3], address(picks, WHOLE, people, size), address(fields, SINGLE, *fields.shape)
+        call("represent", self._at, people, particles, size, trials, *arrays)
         return picks, fields
+
+    def _crowd(self, crowd: Crowd, least: int = 0) -> tuple[tuple[int, int], tuple[int, ...]]:
+        """How many people and particles there are, and where each array of a crowd is; raise with less than needed."""
+        of = self._require_particles(crowd.values, crowd.kinds)
+        if of[1] < least:
+            raise ValueError(f"{least} particles are needed, since they stand for others, or move by their differences")
+        values, kinds = self._values(crowd.values, crowd.kinds)
+        weights, likelihood = address(crowd.log_weights, DOUBLE, *of), address(crowd.log_likelihood, SINGLE, *of)
+        return of, (values, kinds, weights, likelihood, address(crowd.densities, SINGLE, *of, self.blocks + 1))
 
     def _values(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
         return address(values, SINGLE, *values.shape), address(kinds, WHOLE, *kinds.shape)
@@ -260,45 +304,6 @@ class Law:
         arrays = self._values(values, kinds)
         call("draws", self._at, people, particles, address(seeds, NATURAL, people), *arrays)
         return values, kinds
-
-    def sweeps(
-        self,
-        numbers: IntArray,
-        columns: Singles,
-        dice: Seeds,
-        state: tuple[Singles, IntArray, Singles, Singles],
-    ) -> Singles:
-        """Move each person's particles so many times (b,), in place; the counts of their moves, (b, 4).
-
-        Args:
-            numbers: how often each person's particles move, (b,).
-            columns: the trials, (b, n, columns).
-            dice: seeds, which move on, (b,) whole numbers of 64 bits without a sign.
-            state: latents, kinds, log likelihood and log densities of blocks of the particles, which change.
-
-        Returns:
-            Shifts, those that were accepted, jumps, and those that were accepted, (b, 4).
-        """
-        values, kinds, log_likelihood, densities = state
-        people, particles = self._require_particles(values, kinds)
-        trials, counts = columns.shape[1], np.zeros((people, 4), dtype=SINGLE)
-        if particles < 2:
-            raise ValueError("particles move by differences of others")
-        call(
-            "sweeps",
-            self._at,
-            people,
-            particles,
-            trials,
-            address(numbers, WHOLE, people),
-            address(columns, SINGLE, people, trials, COLUMNS),
-            address(dice, NATURAL, people),
-            *self._values(values, kinds),
-            address(log_likelihood, SINGLE, people, particles),
-            address(densities, SINGLE, people, particles, self.blocks + 1),
-            address(counts, SINGLE, people, 4),
-        )
-        return counts
 
     def _require_particles(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
         people, particles, latents = values.shape

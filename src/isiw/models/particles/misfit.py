@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -47,33 +48,35 @@ def _laws(below: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Bets:
-    """The bets against the law of b people."""
+    """The bets against the law of b people: what was foretold of each amplitude, and what became of the stakes."""
 
-    log_won: FloatArray  # log of what each stake has become, (b, k)
-    most: FloatArray  # log of the largest mean of them so far, (b,)
+    foretold: tuple[FloatArray, ...] = ()  # probabilities of less than its lower end, and than its upper one, (b, 2)
 
-    @classmethod
-    def none(cls, people: int) -> Bets:
-        """Before the first amplitude."""
-        return cls(np.zeros((people, 4 * len(STAKED))), np.zeros(people))
+    def after(self, below: FloatArray) -> Bets:
+        """After one more amplitude of each person, of which this was foretold."""
+        return Bets((*self.foretold, below))
+
+    @cached_property
+    def log_won(self) -> FloatArray:
+        """Log of what each stake has become after each amplitude, (n, b, k)."""
+        below = np.array(self.foretold)
+        half = np.maximum(0.5 * (below[..., 1] - below[..., 0]), 0.5 * NARROWEST)
+        middle = np.minimum(np.maximum(0.5 * (below[..., 0] + below[..., 1]), half), 1.0 - half)
+        low, high = _laws(np.stack((middle - half, middle + half)))
+        paid = (high - low) / (2.0 * half[..., np.newaxis])  # (n, b, 4)
+        kept = 1.0 + STAKED[:, np.newaxis] * (paid[..., np.newaxis, :] - 1.0)
+        won: FloatArray = np.log(np.maximum(kept, NARROWEST)).reshape(*below.shape[:2], -1).cumsum(0)
+        return won
+
+    @cached_property
+    def most(self) -> FloatArray:
+        """Log of the largest mean of them so far, (b,)."""
+        most: FloatArray = (log_sum(self.log_won) - math.log(self.log_won.shape[-1])).max(0, initial=0.0)
+        return most
 
     def worth(self, person: int) -> float:
         """What a bet of 1 against one person's law has been worth at most."""
-        return math.exp(min(self.most[person], LARGEST))
-
-    def after(self, below: FloatArray) -> Bets:
-        """After one more amplitude of each person.
-
-        Args:
-            below: predictive probabilities of less than its lower end, and than its upper one, (b, 2).
-        """
-        half = np.maximum(0.5 * (below[:, 1] - below[:, 0]), 0.5 * NARROWEST)
-        middle = np.minimum(np.maximum(0.5 * (below[:, 0] + below[:, 1]), half), 1.0 - half)
-        low, high = _laws(np.stack((middle - half, middle + half)))
-        paid = (high - low) / (2.0 * half[:, np.newaxis])  # (b, 4)
-        kept = 1.0 + STAKED[:, np.newaxis] * (paid[:, np.newaxis] - 1.0)
-        log_won = self.log_won + np.log(np.maximum(kept, NARROWEST)).reshape(self.log_won.shape)
-        return Bets(log_won, np.maximum(self.most, log_sum(log_won) - math.log(log_won.shape[1])))
+        return math.exp(min(self.most[person], LARGEST)) if self.foretold else 1.0
 
 
 def against_level(history: History, row: int) -> float | None:

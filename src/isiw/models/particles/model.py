@@ -14,20 +14,20 @@ from isiw.checks import MOST_OF_A_KIND, Checked, NonNegative, Share, SmallestAmp
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import Later
-from isiw.models.particles.compiled import Crowd, Law
+from isiw.models.particles.compiled import Asking, Crowd, Law
 from isiw.models.particles.jumps import law_of
 from isiw.models.particles.latents import Latents, latents_of
 from isiw.models.particles.misfit import against_level
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
-from isiw.models.particles.posterior import SwarmPosterior
+from isiw.models.particles.posterior import SwarmPosterior, singles
 from isiw.models.particles.predictions import PersonSample, drawn_mep_mv
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import AtIntensity, Observation, PriorPerson
 from isiw.models.shared.draws import NOTED, SIMULATED, seeds, stream
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, grid_of, profile_grid, sampled_estimate
-from isiw.types import ArrayLike, FloatArray
+from isiw.types import Array, ArrayLike, FloatArray, Singles
 from isiw.window import Window
 
 LEAST_SAMPLES = 20
@@ -150,6 +150,12 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         _, fields = self.swarm.picked(self.law, self.model.thinned)
         return PersonSample(fields, self.space, self.trials, self.stronger_pct_rmt)
 
+    def reductions(self, isi_ms: Array, *, of_window: bool) -> Singles:
+        """How much the next MEP is expected to tell; see `ForeseesReductions`."""
+        usual = None if self.swarm.chosen_by is None else self.usual
+        how = Asking(of_window, usual, self.stronger_pct_rmt)
+        return self.law.ask(self.swarm.crowd, singles(isi_ms), self.model.thinned, self.trials, how)
+
     def at_intensity(self, shift_pct_rmt: float) -> AtIntensity:
         """What recruitment curves expect of a stronger pulse, of which other noise says nothing (decision 45)."""
         curved, weights = recruits(self.swarm.latents.noise), self.swarm.log_weights
@@ -158,8 +164,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
             return AtIntensity(self, 0.0)
         kept = np.where(curved, weights, -np.inf)
         kept -= log_sum(kept)[:, np.newaxis]
-        swarm = replace(self.swarm, crowd=self.swarm.crowd._replace(log_weights=kept))
-        return AtIntensity(replace(self, swarm=swarm, stronger_pct_rmt=shift_pct_rmt), share)
+        return AtIntensity(replace(self, swarm=self.swarm.weighing(kept), stronger_pct_rmt=shift_pct_rmt), share)
 
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""
@@ -170,7 +175,9 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
         prior, swarm = self.model.prior, self.swarm
-        latents, fields = swarm.picked(self.law, self.model.particles, person)
+        crowd = swarm.weighed.of_person(person)
+        picks, windows = self.law.estimate(crowd, self.model.particles, self.trials)
+        latents = Latents(crowd.values, crowd.kinds).taken(picks)
 
         def profiles() -> SampledProfiles:
             few = swarm.picked(self.law, self.model.thinned, person)[1]
@@ -178,7 +185,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
             return SampledProfiles(sample.expected_mep_mv(profile_grid(self.space))[0], sample.baselines_mv()[0])
 
         estimate = sampled_estimate(
-            PersonSample(fields, self.space, self.trials).runs(grid_of(self.space)),
+            windows,
             profiles,
             self.space,
             SampledHypotheses(prior.hypothesis(latents)[0], prior.hypotheses),

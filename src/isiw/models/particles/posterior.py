@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, Protocol, Self, TypeVar
@@ -15,7 +14,6 @@ from isiw.models.particles.compiled import Law
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import History, observed
-from isiw.native.engine import Foreseen
 from isiw.types import Array, FloatArray, Singles
 
 
@@ -34,7 +32,6 @@ class _Sample(Protocol):
     """What equally weighted particles say about the next MEP and about the window."""
 
     def outcome_mass(self, isi_ms: Singles) -> Singles: ...
-    def foreseen(self, isi_ms: Singles) -> Iterator[Foreseen]: ...
     def window_masks(self, isi_ms: Singles) -> Singles: ...
     def expected_mep_mv(self, isi_ms: Singles) -> Singles: ...
     def baselines_mv(self) -> Singles: ...
@@ -80,7 +77,7 @@ class SwarmPosterior(ABC, Generic[M]):
 
     def condition(self, isi_ms: Array, mep_mv: Array) -> Self:
         """The same particles, weighed by an imagined trial; see `Conditions`."""
-        return replace(self, swarm=self.swarm.weighed(self._trial(Observation.of(isi_ms, mep_mv)), self.law))
+        return replace(self, swarm=self.swarm.conditioned(self._trial(Observation.of(isi_ms, mep_mv)), self.law))
 
     def _trial(self, observation: Observation) -> History:
         known = self.model.detection_limit_mv, self.model.response_threshold_mv
@@ -89,10 +86,6 @@ class SwarmPosterior(ABC, Generic[M]):
     def outcome_mass(self, isi_ms: Array) -> Singles:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
         return self.sample.outcome_mass(singles(isi_ms))
-
-    def foreseen(self, isi_ms: Array) -> Iterator[Foreseen]:
-        """The same, a person at a time; see `ForeseesOutcomes`."""
-        return self.sample.foreseen(singles(isi_ms))
 
     def window_masks(self, isi_ms: Array) -> Singles:
         """Sampled windows; see `SamplesWindows`."""

@@ -5,7 +5,6 @@ Responses are worked out in tables by facilitation, between whose rows predictio
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final, Self
@@ -16,17 +15,15 @@ from isiw.design import DesignSpace
 from isiw.models.particles.records import FLOOR_SD, LOG_FLOOR, REST, SLOPE
 from isiw.models.shared import history
 from isiw.models.shared.draws import LEVELS, OUTCOMES
-from isiw.models.windows import Runs, grid_of
+from isiw.models.windows import grid_of
 from isiw.native import engine
-from isiw.types import Array, FloatArray, IntArray, Singles
+from isiw.types import FloatArray, Singles
 
 FINE_MS: Final = 1.0
 """Between the points of such a grid facilitation hardly changes."""
 
-_ENDS: Final = np.linspace(0.0, 1.0, OUTCOMES + 1, dtype=np.float32) ** np.float32(1.5)
+CELLS: Final = np.linspace(0.0, 1.0, OUTCOMES + 1, dtype=np.float32) ** np.float32(1.5)
 """Ends of the cells of the log MEP, from 0 to 1, (y + 1,); narrow where MEPs are as small as the floor."""
-
-_MIDDLES, _WIDTHS = 0.5 * (_ENDS[1:] + _ENDS[:-1]), np.diff(_ENDS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,24 +46,17 @@ class TabledSample:
     def outcome_mass(self, isi_ms: Singles) -> Singles:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
         one = self.at_the_next
-        return engine.rows_between(one.fields, one.outcome_table, engine.facilitations(one.fields, isi_ms))
-
-    def foreseen(self, isi_ms: Singles) -> Iterator[engine.Foreseen]:
-        """The same, a person at a time: tables of many people are not kept at once."""
-        next_one = self.at_the_next
-        for person in range(len(self.fields)):
-            one = next_one if len(self.fields) == 1 else replace(next_one, fields=next_one.fields[person : person + 1])
-            yield engine.Foreseen(one.fields, one.outcome_table, engine.facilitations(one.fields, isi_ms))
+        return engine.rows_between(one.fields, one.outcomes[1], engine.facilitations(one.fields, isi_ms))
 
     def mep_quantiles_mv(self, isi_ms: Singles, shares: FloatArray) -> FloatArray:
         """Quantiles of the next MEP [mV], shape (b, t, q)."""
-        below = np.zeros((len(self.fields), len(isi_ms), len(_ENDS)))
+        below = np.zeros((len(self.fields), len(isi_ms), len(CELLS)))
         np.cumsum(self.outcome_mass(isi_ms).mean(1), axis=-1, dtype=float, out=below[..., 1:])
-        cell = np.clip((below[..., np.newaxis, :] < shares[:, np.newaxis]).sum(-1) - 1, 0, len(_ENDS) - 2)
+        cell = np.clip((below[..., np.newaxis, :] < shares[:, np.newaxis]).sum(-1) - 1, 0, len(CELLS) - 2)
         before, behind = (np.take_along_axis(below, at, axis=-1) for at in (cell, cell + 1))
         within = np.clip((shares - before) / np.maximum(behind - before, np.finfo(float).tiny), 0.0, 1.0)
-        ends = _ENDS[cell] + within * (_ENDS[cell + 1] - _ENDS[cell])
-        low, high = (end[:, np.newaxis, np.newaxis] for end in self._log_ends)
+        ends = CELLS[cell] + within * (CELLS[cell + 1] - CELLS[cell])
+        low, high = (end[:, np.newaxis, np.newaxis] for end in self.outcomes[0].T)
         quantiles_mv: FloatArray = np.exp(low + ends * (high - low))
         return quantiles_mv
 
@@ -77,20 +67,9 @@ class TabledSample:
 
     def _with_floor_mv(self, evoked: Singles) -> Singles:
         """From an expected MEP above the floor, in floors, to mV, shape (b, s, ...)."""
-        floor_mv, rest = (each[..., np.newaxis] for each in (np.exp(self._log_floor), self._rest))
+        floor_mv, rest = np.exp(self.fields[..., LOG_FLOOR, None]), np.exp(0.5 * self.fields[..., FLOOR_SD, None] ** 2)
         found: Singles = floor_mv * (evoked + rest)
         return found
-
-    @property
-    def _log_floor(self) -> Singles:
-        """Log of the EMG floor [mV], shape (b, s)."""
-        return self.fields[..., LOG_FLOOR]
-
-    @property
-    def _rest(self) -> Singles:
-        """Mean of the floor, in medians, shape (b, s)."""
-        mean: Singles = np.exp(0.5 * np.square(self.fields[..., FLOOR_SD]))
-        return mean
 
     @cached_property
     def _rows(self) -> tuple[Singles, Singles]:
@@ -102,16 +81,9 @@ class TabledSample:
         return self._rows[1]
 
     @cached_property
-    def _log_ends(self) -> tuple[Singles, Singles]:
-        """Between which log MEPs outcomes lie, each of shape (b,)."""
-        top = self._log_floor + np.log1p(self._evoked.max(-1))
-        return _quantile(self._log_floor, 0.05) - 1.0, _quantile(top, 0.95) + 1.5
-
-    @cached_property
-    def outcome_table(self) -> Singles:
-        """Probability of each outcome of the next trial in each row, shape (b, s, l, y)."""
-        low, high = (end[:, np.newaxis] for end in self._log_ends)
-        return engine.outcome_tables(self.fields, self._rows[0], self.order, low + _MIDDLES * (high - low), _WIDTHS)
+    def outcomes(self) -> tuple[Singles, Singles]:
+        """Between which log MEPs outcomes of the next trial lie, (b, 2), and the probability of each, (b, s, l, y)."""
+        return engine.outcome_tables(self.fields, *self._rows, self.order, CELLS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,30 +112,14 @@ class PersonSample(TabledSample):
 
     def window_masks(self, isi_ms: Singles) -> Singles:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
-        runs, at = self._pairs(isi_ms), np.arange(len(isi_ms))
+        runs, at = engine.window_runs(self.fields, self.edge_level, isi_ms), np.arange(len(isi_ms))
         firsts, behinds = runs[..., ::2, np.newaxis], runs[..., 1::2, np.newaxis]
         inside = (firsts <= at) & (at < behinds)
         return (inside[..., 0, :] | inside[..., 1, :]).astype(np.float32)
 
-    def runs(self, isi_ms: Singles, person: int = 0) -> Runs:
-        """Sampled windows of one person, as runs of some ascending ISIs [ms] (t,)."""
-        return Runs.of_pairs(self._pairs(isi_ms)[person], len(isi_ms))
-
-    def _pairs(self, isi_ms: Singles) -> IntArray:
-        return engine.window_runs(self.fields, self.edge_level, isi_ms).astype(np.int64)
-
     def baselines_mv(self) -> Singles:
         """Expected MEP without a tap [mV], shape (b, s)."""
         return self._with_floor_mv(self._evoked[..., :1])[..., 0]
-
-
-def _quantile(values: Array, share: float) -> Singles:
-    """A quantile of values (b, s), shape (b,); `np.quantile` takes ten times as long for so few."""
-    place = share * (values.shape[-1] - 1)
-    picks = [int(place), min(int(place) + 1, values.shape[-1] - 1)]
-    low, high = np.sort(values)[:, picks].T
-    found: Singles = (low + np.float32(place - picks[0]) * (high - low)).astype(np.float32)
-    return found
 
 
 _FLOORS: Final = np.linspace(-10.0, 16.0, 4097)

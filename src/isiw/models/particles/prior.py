@@ -208,8 +208,11 @@ class Prior(Checked):
 
     def hypothesis(self, latents: Latents) -> IntArray:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
-        curve = self.mixtures["recruitment"].component(latents.values[..., latents_of("recruitment")])
-        return self._hypothesis_numbers[latents.noise, curve]
+        curved = latents.noise == NoiseKind.RECRUITMENT
+        found: IntArray = self._hypothesis_numbers[latents.noise, 0]
+        curve = self.mixtures["recruitment"].component(latents.values[curved][:, _OF_CURVE])
+        found[curved] = self._hypothesis_numbers[NoiseKind.RECRUITMENT, curve]
+        return found
 
     def unusual(self, latents: Latents, space: DesignSpace) -> dict[str, float]:
         """How probable it is that parts of a person are of another law than the usual one, by what they are called."""
@@ -247,6 +250,9 @@ class Prior(Checked):
         own, rectified = latents.of("log_boost"), latents.of(RECTIFIED["log_boost"])
         boost = np.exp(np.where(latents.noise == NoiseKind.RECTIFIED, rectified, own))
         return np.where(latents.present, boost, np.float32(0.0))
+
+
+_OF_CURVE: Final = latents_of("recruitment")
 
 
 def _of_gain(law: Gain) -> list[tuple[float, float]]:

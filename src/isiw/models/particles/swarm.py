@@ -103,6 +103,7 @@ class Swarm:
     history: History
     bets: Bets  # against the law
     health: Health | None = None  # after the last trial; None before the first
+    chosen_by: tuple[Law, Law] | None = None  # their law, and the one that weighs them instead where ISIs are chosen
     halves: int = 1  # 2 where the second half of the particles does not learn from pulses given alone
 
     @classmethod
@@ -112,17 +113,29 @@ class Swarm:
         equal = np.full((people, particles), -math.log(particles))
         nothing = np.zeros((people, particles), dtype=np.float32)
         crowd = Crowd(values, kinds, equal, nothing, law.nothing_known(people, particles))
-        return cls(crowd, np.zeros(people), History.empty(people), Bets.none(people))
+        return cls(crowd, np.zeros(people), History.empty(people), Bets())
 
     @property
     def latents(self) -> Latents:
         """The particles, fields of shape (b, p)."""
         return Latents(self.crowd.values, self.crowd.kinds)
 
-    @property
+    @cached_property
     def log_weights(self) -> FloatArray:
         """Their normalised log weights, (b, p)."""
-        return self.crowd.log_weights
+        if self.chosen_by is None:
+            return self.crowd.log_weights
+        law, usual = self.chosen_by
+        return law.usual_weights(usual, self.crowd)
+
+    @property
+    def weighed(self) -> Crowd:
+        """The particles with these log weights."""
+        return self.crowd._replace(log_weights=self.log_weights)
+
+    def weighing(self, log_weights: FloatArray) -> Swarm:
+        """The same with other log weights."""
+        return replace(self, crowd=self.crowd._replace(log_weights=log_weights), chosen_by=None)
 
     @property
     def trials(self) -> int:
@@ -156,7 +169,7 @@ class Swarm:
         left = self.log_weights - log_sum(heeded)[:, np.newaxis] - UNHEEDED
         log_weights = np.where(who[:, np.newaxis] & self.of_given, left, self.log_weights)
         log_weights -= log_sum(log_weights)[:, np.newaxis]
-        return replace(self, crowd=self.crowd._replace(log_weights=log_weights))
+        return self.weighing(log_weights)
 
     @property
     def before_pairs(self) -> bool:
@@ -175,7 +188,7 @@ class Swarm:
         """The particles of each half of each person, to be changed."""
         people, particles = self.log_weights.shape
         rows = people * self.halves, particles // self.halves
-        return Crowd._make(each.reshape(*rows, *each.shape[2:]) for each in self.crowd.copied())
+        return Crowd._make(each.reshape(*rows, *each.shape[2:]) for each in self.weighed.copied())
 
     def after(self, trial: History, law: Law, moves: Moving, seed: int) -> Swarm:
         """The particles after one more trial: weighed, resampled where too few carry the posterior, and moved."""
@@ -202,7 +215,7 @@ class Swarm:
         below, weights = np.split(sums.sum(1), [2], axis=1)
         return self.bets.after(below / np.maximum(weights, 1e-300))
 
-    def weighed(self, trial: History, law: Law) -> Swarm:
+    def conditioned(self, trial: History, law: Law) -> Swarm:
         """The same particles, weighed by one more trial as well."""
         crowd = self._rows
         told = self._as_curves_have_it(trial, law, crowd)
@@ -225,7 +238,8 @@ class Swarm:
             evidence = log_sum(by_half)
             crowd.log_weights[:] += (by_half - evidence[:, np.newaxis]).reshape(-1, 1)
         crowd = Crowd._make(each.reshape(people, particles, *each.shape[2:]) for each in crowd)
-        return replace(self, crowd=crowd, evidence=self.evidence + evidence, history=history), found
+        learnt = replace(self, crowd=crowd, evidence=self.evidence + evidence, history=history, chosen_by=None)
+        return learnt, found
 
     def _as_curves_have_it(self, trial: History, law: Law, rows: Crowd) -> History:
         """A trial as each half has it; at another intensity with the density that its curves predict (decision 45)."""
@@ -252,7 +266,7 @@ class Swarm:
 
     def as_usual(self, law: Law, usual: Law) -> Swarm:
         """The same particles under the prior that ISIs are chosen with."""
-        return replace(self, crowd=self.crowd._replace(log_weights=law.usual_weights(usual, self.crowd)))
+        return replace(self, chosen_by=(law, usual))
 
     def picked(self, law: Law, size: int, person: int | None = None) -> tuple[Latents, Singles]:
         """Equally weighted particles that represent the same posterior, and what they mean now, fields of (b, s).
@@ -262,7 +276,6 @@ class Swarm:
             size: how many.
             person: of one person alone.
         """
-        some = slice(None) if person is None else slice(person, person + 1)
-        latents = Latents(self.crowd.values[some], self.crowd.kinds[some])
-        picks, fields = law.represent(*latents, self.log_weights[some], size, self.trials)
-        return latents.taken(picks), fields
+        crowd = self.weighed if person is None else self.weighed.of_person(person)
+        picks, fields = law.represent(crowd, size, self.trials)
+        return Latents(crowd.values, crowd.kinds).taken(picks), fields

@@ -13,7 +13,7 @@ enum { NO_PARTICLES = 1 };
 
 /* What is known of a model's prior and of its moves; see `isiw.models.particles.compiled.Tables`. */
 typedef struct {
-    int64_t latents, blocks, width, knots, place_count, states, part_count, jump_count, kind_values;
+    int64_t latents, blocks, width, knots, place_count, states, part_count, jump_count, kind_values, points, outcomes;
     const int64_t *at;         /* of the latent of each meaning; `latents` where the model has none, (MEANINGS,) */
     const float *spreads;      /* usual SD of each latent, (latents,) */
     const int64_t *first;      /* latent of each block, (blocks,) */
@@ -39,7 +39,11 @@ typedef struct {
     const uint8_t *renewed;    /* which kinds each jump draws again, (jump_count, KINDS) */
     const uint8_t *of_profile; /* the jump concerns nothing but a profile, (jump_count,) */
     const float *kinds;        /* sums of the probabilities of earlier values of each kind, (KINDS, kind_values) */
+    const float *grid_ms;      /* ISIs of the space [ms], ascending, (points,) */
+    const float *cells;        /* where outcomes end, as shares of the range of the log MEP, (outcomes + 1,) */
     int64_t changed;           /* block of the latent that says when something changes; that of its size is the next */
+    int64_t rows;              /* of tables by facilitation */
+    int64_t fine;              /* the ISIs are so close to each other that a window's peak is in all of their range */
 } Tables;
 
 typedef struct {
@@ -74,10 +78,11 @@ typedef struct {
                   float *densities, float *counts);
     /* Facilitations of the rows of tables, and expected MEPs above the floor there, in floors, (b, s, rows) each. */
     int (*evoked_means)(int64_t samples, int64_t rows, const float *fields, float *levels, float *means);
-    /* The probability of each outcome of the next trial, after so many, at the facilitations, (b, s, rows, y). */
+    /* The probability of each outcome of the next trial, after so many, at the facilitations (b, s, rows), where an MEP
+    of these means is expected, (b, s, rows, y). Outcomes are cells (y + 1,) between two log MEPs, (b, 2). */
     int (*outcome_tables)(int64_t people, int64_t samples, int64_t rows, int64_t outcomes, int64_t order,
-                          const float *fields, const float *levels, const float *log_mep, const float *widths,
-                          float *table);
+                          const float *fields, const float *levels, const float *means, const float *cells,
+                          float *ends, float *table);
     /* What lies between the rows of tables (b, s, rows, y) at other facilitations (b, s, t), (b, s, t, y). */
     int (*rows_between)(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,
                         const float *table, const float *levels, float *found);
@@ -89,17 +94,24 @@ typedef struct {
     /* Windows as two runs of indices of ISIs: first, behind the last, (b, s, 4). */
     int (*window_runs)(int64_t samples, int64_t isis, const float *fields, const float *levels, const float *isi_ms,
                        int32_t *runs);
-    /* Expected F1 of sets of ISIs (c, t) with windows as runs, the number of the sample, first and behind, (c,). */
-    int (*expected_f1)(int64_t sets, int64_t isis, int64_t runs, const uint8_t *inside, const int64_t *sample,
-                       const int64_t *first, const int64_t *behind, double *found);
-    /* Entropy of the mean of distributions less their mean entropy, (t,). They are a table (s, t, y), or with rows lie
-    between those of one (s, rows, y) at facilitations (s, t). */
-    int (*entropy_reductions)(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,
-                              const float *table, const float *levels, float *found);
-    /* Variance of each point's membership in windows (s, g), less that expected after an outcome, (t,). */
-    int (*variance_reductions)(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, int64_t points,
-                               const float *fields, const float *table, const float *levels, const float *masks,
-                               float *found);
+    /* Of windows as so many runs (s, runs, 2): the set of ISIs (t,) of largest expected F1 among those in at least a
+    share of as many windows as any is in, by shares (cuts,), and this F1. */
+    int (*best_window)(int64_t samples, int64_t most_runs, int64_t isis, int64_t cuts, const int32_t *runs,
+                       const double *shares, uint8_t *inside, double *f1);
+    /* Entropy of the mean of distributions (s, t, y), less their mean entropy, (t,); or, with windows (s, points), the
+    variance of each point's membership less that expected after an outcome, summed. */
+    int (*reductions)(int64_t samples, int64_t isis, int64_t outcomes, int64_t points, const float *mass,
+                      const float *masks, float *found);
+    /* The same by samples of particles, under another prior if there is one, (b, t); their windows at these ISIs are
+    those of the pairs' intensity, and the next pulse is so much stronger [% RMT]. */
+    int (*ask)(const Tables *tables, const Tables *usual, int64_t people, int64_t particles, int64_t size,
+               int64_t trials, int32_t of_window, double stronger, int64_t isis, const float *values,
+               const int64_t *kinds, const float *densities, const double *log_weights, const float *isi_ms,
+               float *found);
+    /* One person's window: the particles that represent all (s,), their windows as runs (s, 4); and `best_window`. */
+    int (*estimate)(const Tables *tables, int64_t particles, int64_t size, int64_t trials, int64_t cuts,
+                    const float *values, const int64_t *kinds, const double *log_weights, const double *shares,
+                    int64_t *picks, int32_t *runs, uint8_t *inside, double *f1);
     /* Elementary functions, for tests: exp, exp2, log, 1 / x, 1 / root x, and the probability that a standard normal
     variable is between x and y, number 0 to 5. */
     int (*elementary)(int32_t number, int64_t count, const float *x, const float *y, float *found);

@@ -5,26 +5,7 @@
 
 #include <stdlib.h>
 
-#include "predictions.h"
-
-/* Distributions of the next outcome: given for each sample and ISI, (s, t, y), or with rows, as tables between whose
-rows (s, rows, y) they lie at facilitations (s, t). */
-typedef struct {
-    int64_t samples, rows, isis, outcomes;
-    const float *fields, *table, *levels;
-} Foreseen;
-
-/* Those at one ISI, (s, y). */
-static void foreseen_at(const Foreseen *of, int64_t t, float *found) {
-    for (int64_t s = 0; s < of->samples; s++) {
-        float *to = found + s * of->outcomes;
-        if (of->rows)
-            between_rows(of->table + s * of->rows * of->outcomes, of->rows, of->outcomes,
-                         of->fields[s * FIELDS + DEPTH], of->levels[s * of->isis + t], to);
-        else
-            memcpy(to, of->table + (s * of->isis + t) * of->outcomes, (size_t)of->outcomes * sizeof *to);
-    }
-}
+#include "vectors.h"
 
 /* Negative entropies of distributions next to each other, summed [nat]. */
 static float negative_entropy(const float *mass, int64_t count) {
@@ -42,84 +23,85 @@ INLINE void added(float factor, const float *values, int64_t count, float *to) {
         stored(loaded(to + i, count - i) + factor * loaded(values + i, count - i), to + i, count - i);
 }
 
-static int entropy_reductions(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,
-                              const float *table, const float *levels, float *found) {
-    Foreseen of = {samples, rows, isis, outcomes, fields, table, levels};
-    float *mass = malloc((size_t)((samples + 1) * outcomes + 1) * sizeof *mass), share = 1.0f / (float)samples;
-    if (!mass) return -1;
-    float *mean = mass + samples * outcomes;
-    for (int64_t t = 0; t < isis; t++) {
-        foreseen_at(&of, t, mass);
-        memset(mean, 0, (size_t)outcomes * sizeof *mean);
-        for (int64_t s = 0; s < samples; s++) added(share, mass + s * outcomes, outcomes, mean);
-        found[t] = share * negative_entropy(mass, samples * outcomes) - negative_entropy(mean, outcomes);
+/* What samples foresee at all ISIs, summed: where nothing else is known of an ISI it is what they foresee at rest. */
+typedef struct {
+    int64_t isis, outcomes, points;
+    float *rest, *more; /* (1 + points, y), and (1 + points, t, y): of all, and what changes from point to point */
+    float *inside;      /* how many windows each point is in, (points,) */
+    float *entropies;   /* negative ones, less those at rest, (t,) */
+    double at_rest;     /* negative entropies */
+} Sums;
+
+/* Sums of nothing; whether there is memory for them. */
+static int begin(Sums *sums, int64_t isis, int64_t outcomes, int64_t points) {
+    int64_t blocks = (1 + points) * outcomes;
+    *sums = (Sums){.isis = isis, .outcomes = outcomes, .points = points};
+    sums->rest = calloc((size_t)(blocks * (1 + isis) + points + isis), sizeof(float));
+    if (!sums->rest) return 0;
+    sums->more = sums->rest + blocks, sums->inside = sums->more + blocks * isis;
+    sums->entropies = sums->inside + points;
+    return 1;
+}
+
+/* Add a sample: its window (points,), what it foresees at rest (y,), and at some of the ISIs (t, y), which changes. */
+static void add_sample(Sums *sums, const float *window, const float *rest, int64_t from, int64_t to, float *mass) {
+    int64_t outcomes = sums->outcomes, block = sums->isis * outcomes, first = from * outcomes;
+    float still = sums->points ? 0.0f : negative_entropy(rest, outcomes), before = 0.0f;
+    sums->at_rest += still;
+    for (int64_t t = from; t < to; t++) {
+        float *at = mass + t * outcomes;
+        if (!sums->points) sums->entropies[t] += negative_entropy(at, outcomes) - still;
+        added(-1.0f, rest, outcomes, at);
     }
-    free(mass);
+    added(1.0f, rest, outcomes, sums->rest);
+    added(1.0f, mass + first, (to - from) * outcomes, sums->more + first);
+    for (int64_t g = 0; g < sums->points; before = window[g++]) {
+        sums->inside[g] += window[g];
+        if (window[g] == before) continue;
+        added(window[g] - before, rest, outcomes, sums->rest + (1 + g) * outcomes);
+        added(window[g] - before, mass + first, (to - from) * outcomes, sums->more + (1 + g) * block + first);
+    }
+}
+
+/* Entropy of the mean of distributions less their mean entropy at each ISI; or, where there are points, the variance of
+each one's membership less that expected after an outcome, summed. */
+static int reduced(const Sums *sums, int64_t samples, float *found) {
+    int64_t outcomes = sums->outcomes, points = sums->points, block = sums->isis * outcomes;
+    float share = 1.0f / (float)samples, *mean = malloc((size_t)outcomes * sizeof *mean);
+    if (!mean) return -1;
+    for (int64_t t = 0; t < sums->isis; t++) {
+        Reals explained = all(0.0f);
+        for (int64_t y = 0, left = outcomes; y < outcomes; y += LANES, left -= LANES) {
+            const float *rest = sums->rest + y, *more = sums->more + t * outcomes + y;
+            Reals whole = loaded(rest, left) + loaded(more, left), inside = all(0.0f), squares = all(0.0f);
+            stored(share * whole, mean + y, left);
+            for (int64_t g = 0; g < points; g++) {
+                rest += outcomes, more += block;
+                inside += loaded(rest, left) + loaded(more, left);
+                Reals apart = inside - share * sums->inside[g] * whole;
+                squares += apart * apart;
+            }
+            explained += squares / most_v(whole, all(1e-12f));
+        }
+        found[t] = points ? share * lanes_sum(explained)
+                          : share * (float)(sums->at_rest + sums->entropies[t]) - negative_entropy(mean, outcomes);
+    }
+    free(mean);
     return 0;
 }
 
-/* Where a sampled window begins or ends. */
-typedef struct {
-    int64_t sample, at;
-    float rise;
-} Change;
-
-/* Where sampled windows begin and end, and the share of the windows at each point; how many changes there are. */
-static int64_t changes_of(const float *masks, int64_t samples, int64_t points, Change *changes, float *mean) {
-    int64_t count = 0;
-    for (int64_t g = 0; g < points; g++) mean[g] = 0.0f;
-    for (int64_t s = 0; s < samples; s++) {
-        float before = 0.0f;
-        for (int64_t g = 0; g < points; g++) {
-            float inside = masks[s * points + g];
-            mean[g] += inside;
-            if (inside != before) changes[count++] = (Change){s, g, inside - before};
-            before = inside;
-        }
+static int reductions(int64_t samples, int64_t isis, int64_t outcomes, int64_t points, const float *mass,
+                      const float *masks, float *found) {
+    Sums sums;
+    float *room = calloc((size_t)((1 + isis) * outcomes), sizeof *room);
+    int failed = !room || !begin(&sums, isis, outcomes, points);
+    for (int64_t s = 0; !failed && s < samples; s++) {
+        memcpy(room + outcomes, mass + s * isis * outcomes, (size_t)(isis * outcomes) * sizeof *room);
+        add_sample(&sums, masks + s * points, room, 0, isis, room + outcomes);
     }
-    for (int64_t g = 0; g < points; g++) mean[g] /= (float)samples;
-    return count;
-}
-
-/* Expected variance of all points that a trial with these outcomes (s, y) explains, by what changes from point to
-point. */
-static float explained(const float *mass, int64_t samples, int64_t outcomes, const Change *changes, int64_t count,
-                       const float *mean, int64_t points, float *steps, float *all_of) {
-    memset(steps, 0, (size_t)(points * outcomes) * sizeof *steps);
-    memset(all_of, 0, (size_t)outcomes * sizeof *all_of);
-    for (int64_t s = 0; s < samples; s++) added(1.0f, mass + s * outcomes, outcomes, all_of);
-    for (int64_t i = 0; i < count; i++)
-        added(changes[i].rise, mass + changes[i].sample * outcomes, outcomes, steps + changes[i].at * outcomes);
-    Reals found = all(0.0f);
-    for (int64_t y = 0; y < outcomes; y += LANES) {
-        Reals whole = loaded(all_of + y, outcomes - y), sum = all(0.0f), reduced = all(0.0f);
-        for (int64_t g = 0; g < points; g++) {
-            sum += loaded(steps + g * outcomes + y, outcomes - y);
-            Reals apart = sum - mean[g] * whole;
-            reduced += apart * apart;
-        }
-        found += reduced / most_v(whole, all(1e-12f));
-    }
-    return lanes_sum(found) / (float)samples;
-}
-
-static int variance_reductions(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, int64_t points,
-                               const float *fields, const float *table, const float *levels, const float *masks,
-                               float *found) {
-    Foreseen of = {samples, rows, isis, outcomes, fields, table, levels};
-    Change *changes = malloc((size_t)(samples * points + 1) * sizeof *changes);
-    float *room = malloc((size_t)(points + (points + samples + 1) * outcomes + 1) * sizeof *room);
-    int there = changes && room;
-    if (there) {
-        float *mean = room, *all_of = room + points, *mass = all_of + outcomes, *steps = mass + samples * outcomes;
-        int64_t count = changes_of(masks, samples, points, changes, mean);
-        for (int64_t t = 0; t < isis; t++) {
-            foreseen_at(&of, t, mass);
-            found[t] = explained(mass, samples, outcomes, changes, count, mean, points, steps, all_of);
-        }
-    }
-    free(changes), free(room);
-    return there ? 0 : -1;
+    if (!failed) failed = reduced(&sums, samples, found), free(sums.rest);
+    free(room);
+    return failed ? -1 : 0;
 }
 
 #endif

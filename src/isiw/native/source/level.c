@@ -1,13 +1,7 @@
 /* The engine at one level of the processor: compiled once for each, with a name of its own (ISIW_LEVEL). */
 
+#include "answers.h"
 #include "engine.h"
-#include "information.h"
-#include "learning.h"
-#include "likelihood.h"
-#include "moves.h"
-#include "predictions.h"
-#include "prior.h"
-#include "windows.h"
 
 static int elementary(int32_t number, int64_t count, const float *x, const float *y, float *found) {
     for (int64_t i = 0; i < count; i += LANES) {
@@ -45,9 +39,10 @@ const Engine *NAMED(ISIW_LEVEL)(void) {
         .facilitations = facilitations,
         .edge_levels = edge_levels,
         .window_runs = window_runs,
-        .expected_f1 = expected_f1,
-        .entropy_reductions = entropy_reductions,
-        .variance_reductions = variance_reductions,
+        .best_window = best_window,
+        .reductions = reductions,
+        .ask = ask,
+        .estimate = estimate,
         .elementary = elementary,
     };
     fill_nodes();

@@ -112,18 +112,66 @@ static void outcomes_of(const float *fields, float responds, const float *means,
     for (int64_t y = 0; y < outcomes; y++) found[y] *= per_sum;
 }
 
-static int outcome_tables(int64_t people, int64_t samples, int64_t rows, int64_t outcomes, int64_t order,
-                          const float *fields, const float *levels, const float *log_mep, const float *widths,
-                          float *table) {
-    float startle, relaxed, *room = malloc((size_t)(2 * NODES * rows + 1) * sizeof *room);
-    if (!room) return -1;
+static int by_size(const void *one, const void *other) {
+    float a = *(const float *)one, b = *(const float *)other;
+    return (a > b) - (a < b);
+}
+
+/* A quantile of some numbers, which it sorts. */
+static float quantile(float *values, int64_t count, double share) {
+    double place = share * (double)(count - 1);
+    int64_t below = (int64_t)place, above = below + 1 < count ? below + 1 : below;
+    qsort(values, (size_t)count, sizeof *values, by_size);
+    return values[below] + (float)(place - (double)below) * (values[above] - values[below]);
+}
+
+/* Between which log MEPs the outcomes of some samples lie. */
+static void ends_of(int64_t samples, int64_t rows, const float *fields, const float *means, float *room, float *ends) {
+    for (int64_t i = 0; i < samples; i++) room[i] = fields[i * FIELDS + LOG_FLOOR];
+    ends[0] = quantile(room, samples, 0.05) - 1.0f;
+    for (int64_t i = 0; i < samples; i++) {
+        float most = 0.0f;
+        for (int64_t row = 0; row < rows; row++) most = most_1(most, means[i * rows + row]);
+        room[i] = fields[i * FIELDS + LOG_FLOOR] + log_1(1.0f + most);
+    }
+    ends[1] = quantile(room, samples, 0.95) + 1.5f;
+}
+
+/* What outcomes of a person's next trial are: middles in log MEPs, then widths, (2, y), by cells between two ends. */
+static void outcomes_between(const float *ends, const float *cells, int64_t outcomes, float *found) {
+    for (int64_t y = 0; y < outcomes; y++) {
+        found[y] = ends[0] + 0.5f * (cells[y] + cells[y + 1]) * (ends[1] - ends[0]);
+        found[outcomes + y] = cells[y + 1] - cells[y];
+    }
+}
+
+/* A particle's table after so many trials, at least the rows that are needed; room is for 2 NODES rows. */
+static void table_of(const float *fields, int64_t order, const float *levels, int64_t rows, const uint8_t *needed,
+                     const float *cells, int64_t outcomes, float *room, float *table) {
+    float startle, relaxed, *sds = room + NODES * rows;
     gain_of((float)order, &startle, &relaxed);
+    components_of(fields, fields[DRIFT] * relaxed + fields[STARTLED] * startle, levels, rows, room, sds);
+    for (int64_t row = 0; row < rows; row++)
+        if (!needed || needed[row])
+            outcomes_of(fields, responses(fields, all(levels[row]))[0], room + row, sds + row, rows, cells,
+                        cells + outcomes, outcomes, table + row * outcomes);
+}
+
+static int outcome_tables(int64_t people, int64_t samples, int64_t rows, int64_t outcomes, int64_t order,
+                          const float *fields, const float *levels, const float *means, const float *cells,
+                          float *ends, float *table) {
+    int64_t of_rows = 2 * NODES * rows;
+    float *room = malloc((size_t)(of_rows + samples + 2 * outcomes) * sizeof *room);
+    if (!room) return -1;
+    float *between = room + of_rows + samples;
     for (int64_t i = 0; i < people * samples; i++) {
-        const float *one = fields + i * FIELDS, *rows_of = levels + i * rows;
-        components_of(one, one[DRIFT] * relaxed + one[STARTLED] * startle, rows_of, rows, room, room + NODES * rows);
-        for (int64_t row = 0; row < rows; row++)
-            outcomes_of(one, responses(one, all(rows_of[row]))[0], room + row, room + NODES * rows + row, rows,
-                        log_mep + i / samples * outcomes, widths, outcomes, table + (i * rows + row) * outcomes);
+        if (i % samples == 0) {
+            float *own = ends + i / samples * 2;
+            ends_of(samples, rows, fields + i * FIELDS, means + i * rows, room, own);
+            outcomes_between(own, cells, outcomes, between);
+        }
+        table_of(fields + i * FIELDS, order, levels + i * rows, rows, NULL, between, outcomes, room,
+                 table + i * rows * outcomes);
     }
     free(room);
     return 0;

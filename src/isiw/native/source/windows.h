@@ -104,23 +104,44 @@ static int window_runs(int64_t samples, int64_t isis, const float *fields, const
     return 0;
 }
 
-/* Expected F1 of sets of ISIs (c, t) with sampled windows, which are runs of ISIs (r,), sample by sample. */
-static int expected_f1(int64_t sets, int64_t isis, int64_t runs, const uint8_t *inside, const int64_t *sample,
-                       const int64_t *first, const int64_t *behind, double *found) {
-    int64_t *before = malloc((size_t)(isis + 1) * sizeof *before);
+/* Expected F1 of a set of ISIs with sampled windows, by how many of the set are before each ISI, (isis + 1,). */
+static double expected_f1(const int32_t *runs, int64_t samples, int64_t most_runs, const int64_t *before,
+                          int64_t isis) {
+    double sum = 0.0;
+    int64_t windows = 0;
+    for (int64_t s = 0; s < samples; s++) {
+        int64_t size = 0, overlap = 0;
+        for (const int32_t *run = runs + s * most_runs * 2, *end = run + most_runs * 2; run < end; run += 2)
+            size += run[1] - run[0], overlap += before[run[1]] - before[run[0]];
+        if (!size) continue;
+        sum += (double)overlap / (double)(before[isis] + size), windows++;
+    }
+    return 2.0 * (sum / (double)windows);
+}
+
+/* The set of ISIs of largest expected F1, of those in at least some shares of as many windows as any is in. */
+static int best_window(int64_t samples, int64_t most_runs, int64_t isis, int64_t cuts, const int32_t *runs,
+                       const double *shares, uint8_t *inside, double *f1) {
+    int64_t *before = calloc((size_t)(2 * isis + 2), sizeof *before), windows = 0, within = 0;
     if (!before) return -1;
-    for (int64_t set = 0; set < sets; set++) {
-        before[0] = 0;
-        for (int64_t t = 0; t < isis; t++) before[t + 1] = before[t] + inside[set * isis + t];
-        int64_t windows = 0;
-        double sum = 0.0;
-        for (int64_t run = 0; run < runs; windows++) {
-            int64_t of = sample[run], size = 0, overlap = 0;
-            for (; run < runs && sample[run] == of; run++)
-                size += behind[run] - first[run], overlap += before[behind[run]] - before[first[run]];
-            sum += (double)overlap / (double)(before[isis] + size);
-        }
-        found[set] = 2.0 * (sum / (double)windows);
+    int64_t *members = before + isis + 1, most = 0;
+    for (int64_t s = 0; s < samples; s++) {
+        const int32_t *own = runs + s * most_runs * 2;
+        windows += own[0] < own[1];
+        for (int64_t i = 0; i < 2 * most_runs; i += 2) members[own[i]]++, members[own[i + 1]]--;
+    }
+    for (int64_t t = 0; t < isis; t++) {
+        within = members[t] += within, inside[t] = 0;
+        most = within > most ? within : most;
+    }
+    *f1 = 0.0;
+    for (int64_t cut = 0; windows && cut < cuts; cut++) {
+        double per = (double)windows, least = shares[cut] * ((double)most / per);
+        for (int64_t t = 0; t < isis; t++) before[t + 1] = before[t] + ((double)members[t] / per >= least);
+        double found = expected_f1(runs, samples, most_runs, before, isis);
+        if (cut && found <= *f1) continue;
+        *f1 = found;
+        for (int64_t t = 0; t < isis; t++) inside[t] = (uint8_t)(before[t + 1] - before[t]);
     }
     free(before);
     return 0;

@@ -24,7 +24,7 @@ from isiw.testing import check_model
 from isiw.window import Window
 from known import known
 from models.told_trials import Trial, told
-from native.drawn import Case, seeds
+from native.drawn import Case, seeds, sweeps
 
 SPACE = DesignSpace(0, 120, reference="impact")
 MODEL = SupraModel(particles=300, thinned=96)
@@ -100,7 +100,7 @@ def test_moves_leave_the_prior_as_it_is() -> None:
     drawn, fresh = case.drawn(4000, 2), case.drawn(4000, 3)
     moved = Latents(drawn.values.copy(), drawn.kinds.copy())
     state = *moved, np.zeros((1, 4000), dtype=np.float32), case.law.nothing_known(1, 4000)
-    counts = case.law.sweeps(np.array([8]), History.empty(1).columns, seeds(4), state)
+    counts = sweeps(case.law, np.array([8]), History.empty(1).columns, seeds(4), state)
     assert (moved.values != drawn.values).any(-1).mean() > 0.9
     assert counts[0, 1] / counts[0, 0] > 0.1
     for name, ours, theirs in zip(LATENTS, moved.values[0].T, fresh.values[0].T, strict=True):

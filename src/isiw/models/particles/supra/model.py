@@ -19,8 +19,9 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation
-from isiw.models.windows import Runs, SampledProfiles, best_window, grid_of, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, grid_of, profile_grid, sampled_estimate
 from isiw.types import Array, Singles
+from isiw.window import Window
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,6 @@ class SupraPosterior(SwarmPosterior[SupraModel]):
             Runs.of_masks(masks(grid)[person]) for masks in (self._all.window_masks, self._all.depressed_masks)
         )
         estimate = sampled_estimate(enhanced, profiles, self.space)
-        probability = len(depressed.found) / depressed.samples
-        segment = best_window(depressed, self.space.grid_ms)[0] if probability >= 0.5 else None
+        probability = len(depressed.found) / len(depressed.pairs)
+        segment = Window.from_mask(self.space.grid_ms, depressed.best[0]) if probability >= 0.5 else None
         return estimate.noting(depressed=segment, depressed_probability=probability)
