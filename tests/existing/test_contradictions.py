@@ -192,3 +192,22 @@ def test_what_is_masked_or_comes_before_the_impact_does_not_count() -> None:
 def test_what_pandas_holds_for_missing_is_empty() -> None:
     table = pd.DataFrame({"isi_ms": [10, 20, None, 30], "mep_mv": [0.1, 0.2, None, 0.4]}).convert_dtypes()
     assert trials_of(read_people(table, IMPACT)) == [(10, 0.1), (20, 0.2), (30, 0.4)]
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("#isi_ms,mep_mv\n10,0.15\n#15,0.2\n20,.3\n40,.5\n", [10, 20, 40]),
+        ("#isi_ms,mep_mv\n10,0.15\n# pause\n20,.3\n#isi_ms,mep_mv\n40,.5\n", [10, 20, 40]),
+        ("#isi_ms,mep_mv\n10,0.15\n20,.3\n40,.5\n#time,force,x\n75,1.1,4\n", [10, 20, 40]),
+        ("isi_ms,mep_mv,note\n10,0.15\n20,.3,ok\nisi_ms,mep_mv,note\n40,.5,ok\n50,.6,ok\n", None),
+        ("#isi_ms,mep_mv\n10,0.15\n20,.3\n#time,force\n75,1.1\n", None),
+    ],
+    ids=["a trial left out", "names again after #", "another part", "names again", "another part of as many columns"],
+)
+def test_no_trial_is_lost_where_a_line_stands_between_them(text: str, kept: list[int] | None, tmp_path: Path) -> None:
+    if kept is not None:
+        assert [isi_ms for isi_ms, _ in trials_of(of_text(text, tmp_path))] == kept
+        return
+    with pytest.raises(InvalidValueError, match="is no number"):
+        of_text(text, tmp_path)
