@@ -164,8 +164,12 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
 
 
 def text_of_file(path: Path) -> str:
-    """The text in a file, however it is encoded."""
-    content = _content(path)
+    """The text in a file."""
+    return decoded(_content(path))
+
+
+def decoded(content: bytes) -> str:
+    """A text, however it is encoded."""
     if content[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         return content.decode("utf-16")
     for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):  # the same without a mark of the order of its bytes
