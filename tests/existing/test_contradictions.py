@@ -211,3 +211,20 @@ def test_no_trial_is_lost_where_a_line_stands_between_them(text: str, kept: list
         return
     with pytest.raises(InvalidValueError, match="is no number"):
         of_text(text, tmp_path)
+
+
+@pytest.mark.parametrize(("bad", "good"), [("excluded", ""), ("bad", "ok"), ("rejected", "accepted"), ("yes", "no")])
+@pytest.mark.parametrize("name", ["exclude", "artifacts", "status"])
+def test_what_a_cell_calls_a_trial_holds_whatever_its_column_asks(
+    name: str, bad: str, good: str, tmp_path: Path
+) -> None:
+    if name == "status" and bad == "yes":
+        bad, good = good, bad
+    rows = "".join(f"{isi},{isi / 100},{bad if isi == 20 else good}\n" for isi in (10, 20, 40, 50))
+    (person,) = of_text(f"isi_ms,mep_mv,{name}\n{rows}", tmp_path)
+    assert [trial.told for trial in person.trials] == [True, False, True, True]
+
+
+def test_columns_that_pandas_numbered_since_they_have_one_name_are_asked_about(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match=r"several columns .* mep; got 'mep_mv or mep_mv.1'"):
+        of_text("isi_ms,mep_mv,mep_mv.1\n10,0.1,0.3\n20,.3,.4\n40,.5,.2\n", tmp_path)

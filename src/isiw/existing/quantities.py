@@ -59,9 +59,13 @@ class Columns:
         """The rows that are not TMS alone."""
         return [row for row in self.rows if not self.tms_alone(row)]
 
+    def excluded(self, row: int) -> bool:
+        """True if a row is marked as excluded, by yes or by a word such as bad."""
+        return bool(self["exclude"].flag(row, "left out", "counted"))
+
     def lost(self, row: int) -> Kind | None:
         """Why a row is marked as lost; None if it is not."""
-        bad = self["exclude"].flag(row) and "status" not in self.of
+        bad = self.excluded(row) and "status" not in self.of
         return Kind.of_mistrial(self["reason"].text(row)) if bad or self["status"].flag(row) is False else None
 
     @classmethod
@@ -153,7 +157,8 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
             stated = next((name for name in names if name.partition(" (")[0] == stated), stated)
         require_one("column", source, stated, names)
         return stated
-    free = [(name, letters(name)) for name in names if name not in layout.columns.values()]
+    free = [(name, letters(re.sub(r"\.\d+$", "", name)))  # so pandas numbers names that come again
+            for name in names if name not in layout.columns.values()]  # fmt: skip
     found = [(known, name) for known in COLUMNS[key] for name, plain_name in free if plain_name == known]
     first = found[0][0] if found else ""
     several = [name for known, name in found
