@@ -228,3 +228,17 @@ def test_what_a_cell_calls_a_trial_holds_whatever_its_column_asks(
 def test_columns_that_pandas_numbered_since_they_have_one_name_are_asked_about(tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match=r"several columns .* mep; got 'mep_mv or mep_mv.1'"):
         of_text("isi_ms,mep_mv,mep_mv.1\n10,0.1,0.3\n20,.3,.4\n40,.5,.2\n", tmp_path)
+
+
+def test_a_column_that_is_called_tms_alone_says_it_or_contradicts_an_isi(tmp_path: Path) -> None:
+    text = "isi_ms,mep_mv,single_pulse\n,0.1,yes\n20,.3,no\n0,.12,yes\n40,.5,no\n"
+    assert trials_of(of_text(text, tmp_path)) == [(None, 0.1), (20, 0.3), (None, 0.12), (40, 0.5)]
+    with pytest.raises(InvalidValueError, match=r"row 1 of the column 'single_pulse' .* and the ISI there is 30"):
+        of_text(text.replace("\n,", "\n30,"), tmp_path)
+    (person,) = of_text("isi_ms,mep_mv,single_pulse\n10,.1,.2\n20,.3,.2\n40,.5,.2\n", tmp_path)
+    assert person.unused == ("single_pulse",)
+
+
+def test_two_conditions_whose_words_may_be_tms_alone_are_not_pooled(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="says TMS alone, and the ISI there is 10; got 'control'"):
+        of_text("condition,isi_ms,mep_mv\ncontrol,10,0.1\ntest,20,0.3\ncontrol,40,0.5\n", tmp_path)

@@ -50,6 +50,7 @@ _COLUMNS: Final = {
                "uitgesloten verworpen",
     "reason": "reason grund",
     "tap_alone": "tapalone",
+    "tms_alone": "tmsalone tmsonly singlepulse singletms pulsealone",
     "intensity": "intensitypctrmt pctrmt intensityrmt percentrmt intensitypercentrmt",
     "subject": "subject subjectid participant participantid subj person patient sub proband probandin "
                "versuchsperson vp teilnehmer teilnehmerin sujet sujeto participante soggetto partecipante proefpersoon "

@@ -48,7 +48,13 @@ class Columns:
         isi = self.of["isi"]
         if says_alone(isi.cells[row], self.layout.alone):
             return True
-        return says_alone(self["condition"].text(row), None) and (isi.number(row) or 0.0) <= 0
+        return self.called_alone(row) is not None and (isi.number(row) or 0.0) <= 0
+
+    def called_alone(self, row: int) -> Column | None:
+        """The column that calls a row TMS alone, besides that of the ISIs; None if none does."""
+        if self["tms_alone"].flag(row):
+            return self["tms_alone"]
+        return self["condition"] if says_alone(self["condition"].text(row), None) else None
 
     def tap_alone(self, row: int) -> bool:
         """True if a row is a tap alone, by a column for it or by its condition."""
@@ -88,12 +94,11 @@ class Columns:
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
                 of_units |= units.keys()
         columns, stated = _scaled(columns, layout)
-        if (subject := columns.pop("subject", None)) is not None:
-            is_id = "subject" not in layout.columns and letters(subject.name) == "id"
-            if is_id and 1 < len(frame) == len({*subject.texts}):
-                held["subject"] = None  # each row has one of its own, so that it is of trials and not of people
-            else:
-                columns["subject"] = replace(subject, of_codes=True)
+        for key in [key for key, column in columns.items() if key not in layout.columns and _is_another(key, column)]:
+            held[key] = None
+            del columns[key]
+        if "subject" in columns:
+            columns["subject"] = replace(columns["subject"], of_codes=True)
         if "mep" in columns:
             doubts.require_single_trials(columns["mep"], columns["isi"], frame, source)
         beside = {
@@ -110,6 +115,13 @@ class Columns:
                 beside[condition.name] = of_pairs
         empty = Column("", [None] * len(frame), of=source)
         return cls(columns, _chosen([*columns.values(), *beside.values()], layout), layout, stated, beside, empty)
+
+
+def _is_another(key: str, column: Column) -> bool:
+    """True if a column holds something else than its name says: an id of each row, or amplitudes of single pulses."""
+    if key == "subject":
+        return letters(column.name) == "id" and 1 < len(column.texts) == len({*column.texts})
+    return key == "tms_alone" and not {*map(str.casefold, column.texts)} <= {"", *WORDS["yes"], *WORDS["no"]}
 
 
 def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:

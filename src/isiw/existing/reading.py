@@ -246,6 +246,13 @@ def _with_intensities(trials: Sequence[Trial], columns: Columns) -> tuple[list[T
             remedy = "It must be in % of the resting motor threshold."
             raise columns.of["intensity"].refused(row, "is no intensity in % RMT", remedy)
     paired = {pct_rmt for trial, pct_rmt in zip(trials, stated, strict=True) if trial.wanted_isi_ms is not None}
+    rows = zip(columns.rows, trials, stated, strict=True)
+    name, texts = columns["intensity"].name, {pct_rmt: columns["intensity"].text(row) for row, trial, pct_rmt in rows
+                                              if trial.wanted_isi_ms is not None and pct_rmt}  # fmt: skip
+    if len(texts) > 1 and name not in columns.layout.where:
+        what, got = f"the pairs of {columns['isi'].of} have several intensities", ", ".join(texts.values())
+        remedy = f'Say --where "{name}={next(iter(texts.values()))}" for one of them, or --where "{name}={doubts.ALL}" '
+        raise InvalidValueError(what, got=f"{got} % RMT", remedy=f"{remedy}if all are to be analysed together.")
     usual, own = paired.pop() if len(paired) == 1 else None, list[Trial]()
     for trial, pct_rmt in zip(trials, stated, strict=True):
         of_alone = trial.wanted_isi_ms is None and not trial.tap_alone and pct_rmt != usual
