@@ -242,3 +242,13 @@ def test_a_column_that_is_called_tms_alone_says_it_or_contradicts_an_isi(tmp_pat
 def test_two_conditions_whose_words_may_be_tms_alone_are_not_pooled(tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match="says TMS alone, and the ISI there is 10; got 'control'"):
         of_text("condition,isi_ms,mep_mv\ncontrol,10,0.1\ntest,20,0.3\ncontrol,40,0.5\n", tmp_path)
+
+
+@pytest.mark.parametrize(("name", "others"), [("reason", ""), ("condition", "paired"), ("type", ""), ("note", "")])
+@pytest.mark.parametrize("word", ["artefact", "#bad", "exclude: hum"])
+def test_a_word_that_excludes_a_trial_is_asked_about_in_any_column(
+    name: str, others: str, word: str, tmp_path: Path
+) -> None:
+    rows = "".join(f"{isi},{isi / 100},{word if isi == 20 else others}\n" for isi in (10, 20, 40, 50))
+    with pytest.raises(InvalidValueError, match=r"row 2 .* says that the trial does not count"):
+        of_text(f"isi_ms,mep_mv,{name}\n{rows}", tmp_path)

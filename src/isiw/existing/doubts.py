@@ -115,8 +115,8 @@ def _is_spread(name: str) -> bool:
 def require_no_verdicts(beside: Iterable[Column]) -> None:
     """Raise if a column of which nothing is read says that a trial does not count."""
     for column in beside:
-        texts = {cell for cell in column.cells if isinstance(cell, str)}
-        if odd := next((text for text in texts if text.strip(" !.?#*()[]").casefold() in WORDS["left out"]), None):
+        texts = {cell: cell.partition(":")[0].strip(" !.?#*()[]") for cell in column.cells if isinstance(cell, str)}
+        if odd := next((text for text, word in texts.items() if word.casefold() in WORDS["left out"]), None):
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(odd), "says that the trial does not count", remedy)
 

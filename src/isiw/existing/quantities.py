@@ -94,7 +94,7 @@ class Columns:
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
                 of_units |= units.keys()
         columns, stated = _scaled(columns, layout)
-        for key in [key for key, column in columns.items() if key not in layout.columns and _is_another(key, column)]:
+        for key in [key for key in columns if key not in layout.columns and _is_another(key, columns)]:
             held[key] = None
             del columns[key]
         if "subject" in columns:
@@ -106,7 +106,7 @@ class Columns:
             for place, name in enumerate(names)
             if name not in {*held.values(), *of_units} and name.strip()
         }
-        doubts.require_no_verdicts(beside.values())
+        doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})])
         doubts.require_reference(columns["isi"], layout.reference)
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = WORDS["alone"] | WORDS["tap alone"]
@@ -117,11 +117,14 @@ class Columns:
         return cls(columns, _chosen([*columns.values(), *beside.values()], layout), layout, stated, beside, empty)
 
 
-def _is_another(key: str, column: Column) -> bool:
-    """True if a column holds something else than its name says: an id of each row, or amplitudes of single pulses."""
+def _is_another(key: str, columns: Mapping[str, Column]) -> bool:
+    """True if a column is of no use as what its name says: an id of each row, reasons of nothing, or amplitudes."""
+    texts = columns[key].texts if key in {"subject", "tms_alone"} else []
     if key == "subject":
-        return letters(column.name) == "id" and 1 < len(column.texts) == len({*column.texts})
-    return key == "tms_alone" and not {*map(str.casefold, column.texts)} <= {"", *WORDS["yes"], *WORDS["no"]}
+        return letters(columns[key].name) == "id" and 1 < len(texts) == len({*texts})
+    if key == "tms_alone":
+        return not {*map(str.casefold, texts)} <= {"", *WORDS["yes"], *WORDS["no"]}
+    return key == "reason" and not {"status", "exclude"} & columns.keys()
 
 
 def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:
