@@ -198,14 +198,12 @@ def _require_ascending(columns: Columns) -> None:
 def require_said(columns: Columns) -> None:
     """Raise if it is not stated what rows without an ISI are, or if a row is both a pair and TMS alone."""
     isi, condition, paired = columns["isi"], columns["condition"], columns.paired
-    called = [(row, by) for row in paired if columns.layout.alone is None and (by := columns.called_alone(row))]
     one_word = len({*map(plain, map(condition.text, columns.rows))}) == 1  # in all rows it means nothing
-    for row, by in called:
-        if by is condition and one_word:
-            continue
-        remedy = "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it is "
-        remedy += "a pair, rename the column."
-        raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
+    for row in paired if columns.layout.alone is None else ():
+        if (by := columns.called_alone(row)) is not None and not (by is condition and one_word):
+            remedy = "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it "
+            remedy += "is a pair, rename the column."
+            raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
     empty = [row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None]
     empty = [row for row in empty if "mep" not in columns.of or columns["mep"].number(row) is not None]
     if empty and "asked" not in columns.of:

@@ -8,7 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from itertools import islice, pairwise, zip_longest
+from itertools import chain, islice, pairwise, zip_longest
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -103,14 +103,16 @@ def _texts(text: str, layout: Layout) -> pd.DataFrame:
 
 def _first_part(lines: Sequence[str], separator: str) -> Iterator[str]:
     """Of parts that begin with a # and names of their own the first one, without trials that a # leaves out."""
-    yield lines[0].lstrip("# ")
-    names, *_ = _split([lines[0].lstrip("# ")], separator)
+    names, *_ = _split([head := lines[0].lstrip("# ")], separator)
+    yield head
     for line, below in pairwise([*lines[1:], ""]):
-        (cells, *_), (after, *_) = ([*_split([one.lstrip("# ")], separator), []] for one in (line, below))
-        if line.startswith("#") and len(cells) == len(after) != len(names):
-            return
-        if not (line.startswith("#") and (cells == names or cells[:1] == [] or cells[0][:1].isdigit())):
-            yield line
+        if line.startswith("#"):
+            cells, after = ([*chain(*_split([one.lstrip("# ")], separator))] for one in (line, below))
+            if len(cells) == len(after) != len(names):
+                return
+            if cells in ([], names) or cells[0][:1].isdigit():
+                continue
+        yield line
 
 
 def _first(lines: Sequence[str], layout: Layout) -> int:

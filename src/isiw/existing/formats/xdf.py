@@ -32,7 +32,6 @@ BOUNDARY: Final = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
 _HEADER, _SAMPLES, _FOOTER = 2, 3, 6
 _LATE_S: Final = 1e-3
 _MOST: Final = 2**31  # a chunk that is longer [bytes] is damaged
-_FEWEST: Final = 3  # a stream with fewer rows of samples says no rate, and has no EMG
 _OF_MARKERS: Final = ("marker", "trig", "ttl", "stim", "event")
 
 
@@ -40,7 +39,8 @@ def read(path: Path, _layout: Layout) -> Contents:
     """The channels and markers of all streams, on one clock; gaps are found here, since pyxdf smooths them away."""
     load, held = library("pyxdf", "import").load_xdf, dict[int, _Stream]()
     found, _ = load(io.BytesIO(b"XDF:" + b"".join(_shortened(path, held))), dejitter_timestamps=False, verbose=False)
-    streams = [(held[one["info"]["stream_id"]], one) for one in found if len(one["time_stamps"])]
+    streams = [(own, one) for one in found  # of fewer rows of numbers nobody knows the rate
+               if len(one["time_stamps"]) > 2 * (own := held[one["info"]["stream_id"]]).has_numbers]  # fmt: skip
     begun_s = min((float(stream["time_stamps"][0]) for _, stream in streams), default=0.0)
     several = len({own.said.findtext("hostname") for own, _ in streams}) > 1
     tracks, rows, notes = list[Track](), list[Event](), list[str]()
@@ -48,8 +48,6 @@ def read(path: Path, _layout: Layout) -> Contents:
         times_s = np.asarray(stream["time_stamps"]) - begun_s
         if several and not len(stream["clock_times"]):
             notes.append(f"The stream {own.name} has no clock offsets, and another computer recorded beside it.")
-        if own.has_numbers and len(times_s) < _FEWEST:
-            continue
         if own.has_numbers:
             own.rows = own.rows[: len(times_s)]  # pyxdf leaves samples out that came after the stream had ended
             firsts, samples = np.array([row[0] for row in own.rows]), own.rows[-1][1]
