@@ -10,12 +10,9 @@ import gzip
 import io
 import re
 import struct
-from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache, partial
-from itertools import pairwise
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree as ET
@@ -26,7 +23,7 @@ from isiw.existing.formats.contents import Contents, Event, Track, clocked, even
 from isiw.existing.layout import Layout
 from isiw.opening import opened
 from isiw.text.named_code import library
-from isiw.types import FloatArray
+from isiw.types import FloatArray, IntArray
 
 BOUNDARY: Final = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
 _HEADER, _SAMPLES, _FOOTER = 2, 3, 6
@@ -49,9 +46,10 @@ def read(path: Path, _layout: Layout) -> Contents:
         if several and not len(stream["clock_times"]):
             notes.append(f"The stream {own.name} has no clock offsets, and another computer recorded beside it.")
         if own.has_numbers:
-            own.rows = own.rows[: len(times_s)]  # pyxdf leaves samples out that came after the stream had ended
-            firsts, samples = np.array([row[0] for row in own.rows]), own.rows[-1][1]
-            rate_hz, stretches, said = clocked(times_s, own.rate_hz, f"the stream {own.name}", firsts, samples)
+            kept = np.concatenate(own.chunks)[: len(times_s)]  # of which pyxdf left out what came after the end
+            own.rows = np.ascontiguousarray(kept.T)
+            what, samples = f"the stream {own.name}", int(own.rows[1, -1])
+            rate_hz, stretches, said = clocked(times_s, own.rate_hz, what, own.rows[0], samples)
             notes += said
             tracks += [Track(label, rate_hz, stretches, partial(own.read, n), unit, kind)
                        for n, (label, unit, kind) in enumerate(own.channels())]  # fmt: skip
@@ -71,7 +69,8 @@ class _Stream:
         self.count, self.rate_hz = int(said.findtext("channel_count", "")), float(said.findtext("nominal_srate") or 0.0)
         self.has_numbers = self.rate_hz > 0 and self.form != "string"
         self.type = np.dtype(self.form.replace("double", "float") if self.has_numbers else "u1").newbyteorder("<")
-        self.last_s, self.rows = 0.0, list[tuple[int, int, int, int]]()  # from and to a sample, its place, and step
+        self.last_s, self.samples, self.chunks = 0.0, 0, list[IntArray]()  # so far
+        self.rows = np.empty((4, 0), np.int64)  # from and to a sample, where the first is, and how far to the next
 
     def channels(self) -> Iterator[tuple[str, str, str]]:
         """The label, unit and type of each channel."""
@@ -95,24 +94,26 @@ class _Stream:
             raise IndexError("the chunk holds no samples, or is damaged")
         turns = np.abs(np.diff(times_s) - step_s) > _LATE_S
         turns[:-1] |= np.diff(places, 2) != 0
-        begins = np.unique([0, *np.flatnonzero(turns) + 1, len(places) - 1]).tolist()
-        before, steps, kept = self.rows[-1][1] if self.rows else 0, np.diff(places, append=0).tolist(), []
-        for begin, stop in pairwise([*begins, len(places)]):
-            self.rows.append((before + begin, before + stop, at + places[begin], steps[begin]))
-            kept.append(struct.pack("<Bd", 8, times_s[begin]) + content[places[begin] :][:width])
-        self.last_s = at_s
+        begins = np.unique([0, *np.flatnonzero(turns) + 1, len(places) - 1])
+        steps, ends = np.diff(places, append=places[-1])[begins], np.append(begins[1:], len(places))
+        firsts = np.array(places)[begins]
+        self.chunks.append(np.column_stack([self.samples + begins, self.samples + ends, at + firsts, steps]))
+        kept = [struct.pack("<Bd", 8, times_s[begin]) + content[place : place + width]
+                for begin, place in zip(begins.tolist(), firsts.tolist(), strict=True)]  # fmt: skip
+        self.last_s, self.samples = at_s, self.samples + len(places)
         return content[:4] + b"\x08" + len(kept).to_bytes(8, "little") + b"".join(kept)
 
     def ended(self, content: bytes) -> bytes:
         """The footer, by what pyxdf gets: it leaves out samples beyond those that the stream had."""
-        samples, rows = (self.rows[-1][1], len(self.rows)) if self.rows else (0, 0)
-        return re.sub(rb"(?<=<sample_count>)\d+", lambda n: b"%d" % (rows - max(0, samples - int(n[0]))), content)
+        rows = sum(map(len, self.chunks))
+        return re.sub(rb"(?<=<sample_count>)\d+", lambda n: b"%d" % (rows - max(0, self.samples - int(n[0]))), content)
 
     def read(self, channel: int, first: int, last: int) -> FloatArray:
         """The numbers of a channel from one sample to before another."""
-        found, since = [np.empty(0)], bisect_right(self.rows, first, key=itemgetter(1))
+        found, (begins, ends, *_) = [np.empty(0)], self.rows
+        span = slice(np.searchsorted(ends, first, "right"), np.searchsorted(begins, last))
         with _opened(self.path) as file:
-            for begin, end, place, step in self.rows[since : bisect_left(self.rows, last, key=itemgetter(0))]:
+            for begin, end, place, step in self.rows[:, span].T.tolist():
                 count = min(end, last) - max(begin, first)
                 file.seek(place + max(0, first - begin) * step + channel * self.type.itemsize)
                 raw = file.read((count - 1) * step + self.type.itemsize)
