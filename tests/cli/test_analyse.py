@@ -171,6 +171,14 @@ def test_who_cannot_be_analysed_keeps_nobody_else_from_it(isiw: Command, people:
 
 
 @pytest.mark.usefixtures("read_here")
+def test_a_person_whose_code_is_spelt_in_two_ways_is_not_replayed_by_one_of_them(isiw: Command, people: Path) -> None:
+    people.write_text(people.read_text().replace("B,", "a,"))
+    done = isiw("replay", people, "--reference", "impact", "--only", "A")
+    assert done.exit_code == 1
+    assert "differs from another one only in case" in done.output
+
+
+@pytest.mark.usefixtures("read_here")
 def test_a_replay_takes_every_option_that_a_file_may_need(isiw: Command, people: Path) -> None:
     rows = pd.read_csv(people)
     rows = rows[rows["subject"] == "A"].drop(columns="subject")

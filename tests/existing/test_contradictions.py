@@ -192,3 +192,63 @@ def test_what_is_masked_or_comes_before_the_impact_does_not_count() -> None:
 def test_what_pandas_holds_for_missing_is_empty() -> None:
     table = pd.DataFrame({"isi_ms": [10, 20, None, 30], "mep_mv": [0.1, 0.2, None, 0.4]}).convert_dtypes()
     assert trials_of(read_people(table, IMPACT)) == [(10, 0.1), (20, 0.2), (30, 0.4)]
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("#isi_ms,mep_mv\n10,0.15\n#15,0.2\n20,.3\n40,.5\n", [10, 20, 40]),
+        ("#isi_ms,mep_mv\n10,0.15\n# pause\n20,.3\n#isi_ms,mep_mv\n40,.5\n", [10, 20, 40]),
+        ("#isi_ms,mep_mv\n10,0.15\n20,.3\n40,.5\n#time,force,x\n75,1.1,4\n", [10, 20, 40]),
+        ("isi_ms,mep_mv,note\n10,0.15\n20,.3,ok\nisi_ms,mep_mv,note\n40,.5,ok\n50,.6,ok\n", None),
+        ("#isi_ms,mep_mv\n10,0.15\n20,.3\n#time,force\n75,1.1\n", None),
+    ],
+    ids=["a trial left out", "names again after #", "another part", "names again", "another part of as many columns"],
+)
+def test_no_trial_is_lost_where_a_line_stands_between_them(text: str, kept: list[int] | None, tmp_path: Path) -> None:
+    if kept is not None:
+        assert [isi_ms for isi_ms, _ in trials_of(of_text(text, tmp_path))] == kept
+        return
+    with pytest.raises(InvalidValueError, match="is no number"):
+        of_text(text, tmp_path)
+
+
+@pytest.mark.parametrize(("bad", "good"), [("excluded", ""), ("bad", "ok"), ("rejected", "accepted"), ("yes", "no")])
+@pytest.mark.parametrize("name", ["exclude", "artifacts", "status"])
+def test_what_a_cell_calls_a_trial_holds_whatever_its_column_asks(
+    name: str, bad: str, good: str, tmp_path: Path
+) -> None:
+    if name == "status" and bad == "yes":
+        bad, good = good, bad
+    rows = "".join(f"{isi},{isi / 100},{bad if isi == 20 else good}\n" for isi in (10, 20, 40, 50))
+    (person,) = of_text(f"isi_ms,mep_mv,{name}\n{rows}", tmp_path)
+    assert [trial.told for trial in person.trials] == [True, False, True, True]
+
+
+def test_columns_that_pandas_numbered_since_they_have_one_name_are_asked_about(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match=r"several columns .* mep; got 'mep_mv or mep_mv.1'"):
+        of_text("isi_ms,mep_mv,mep_mv.1\n10,0.1,0.3\n20,.3,.4\n40,.5,.2\n", tmp_path)
+
+
+def test_a_column_that_is_called_tms_alone_says_it_or_contradicts_an_isi(tmp_path: Path) -> None:
+    text = "isi_ms,mep_mv,single_pulse\n,0.1,yes\n20,.3,no\n0,.12,yes\n40,.5,no\n"
+    assert trials_of(of_text(text, tmp_path)) == [(None, 0.1), (20, 0.3), (None, 0.12), (40, 0.5)]
+    with pytest.raises(InvalidValueError, match=r"row 1 of the column 'single_pulse' .* and the ISI there is 30"):
+        of_text(text.replace("\n,", "\n30,"), tmp_path)
+    (person,) = of_text("isi_ms,mep_mv,single_pulse\n10,.1,.2\n20,.3,.2\n40,.5,.2\n", tmp_path)
+    assert person.unused == ("single_pulse",)
+
+
+def test_two_conditions_whose_words_may_be_tms_alone_are_not_pooled(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="says TMS alone, and the ISI there is 10; got 'control'"):
+        of_text("condition,isi_ms,mep_mv\ncontrol,10,0.1\ntest,20,0.3\ncontrol,40,0.5\n", tmp_path)
+
+
+@pytest.mark.parametrize(("name", "others"), [("reason", ""), ("condition", "paired"), ("type", ""), ("note", "")])
+@pytest.mark.parametrize("word", ["artefact", "#bad", "exclude: hum"])
+def test_a_word_that_excludes_a_trial_is_asked_about_in_any_column(
+    name: str, others: str, word: str, tmp_path: Path
+) -> None:
+    rows = "".join(f"{isi},{isi / 100},{word if isi == 20 else others}\n" for isi in (10, 20, 40, 50))
+    with pytest.raises(InvalidValueError, match=r"row 2 .* says that the trial does not count"):
+        of_text(f"isi_ms,mep_mv,{name}\n{rows}", tmp_path)

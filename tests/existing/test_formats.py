@@ -90,6 +90,13 @@ def test_an_edf_file_of_triggered_sweeps_has_all_of_them(tmp_path: Path) -> None
     require_as_written(read(without_records(as_edf(tmp_path, record_s=0.5), *halves), KNOWN))
 
 
+def test_a_stream_of_xdf_that_had_just_begun_keeps_nothing_from_being_read(tmp_path: Path) -> None:
+    path = as_xdf(tmp_path)
+    begun = chunk(3, struct.pack("<IBB", 3, 1, 2) + struct.pack("<BdfBf", 8, 1013.9, 1.0, 0, 1.0))
+    path.write_bytes(path.read_bytes() + header(3, "Force", "Force", "float32", 100.0) + begun)
+    require_as_written(read(path, NAMED))
+
+
 @pytest.mark.parametrize("suffix", [".xdf", ".xdfz"])
 def test_samples_of_xdf_are_those_of_pyxdf_whichever_of_them_have_a_time(suffix: str, tmp_path: Path) -> None:
     rng, number = np.random.default_rng(3), 0
@@ -162,6 +169,9 @@ def test_a_table_of_spss_or_stata_has_the_units_and_words_of_its_labels(suffix: 
     as_statistics(tmp_path / f"P02{written}", "Peak to peak (% of control)")
     with pytest.raises(IsiwError, match="relative to others"):
         read(tmp_path / f"P02{written}", layout.saying(units=("uV",)))
+    as_statistics(tmp_path / f"P03{written}", of_isis={30: "15"})
+    with pytest.raises(IsiwError, match=r"numbers as labels, and others have no label; got '15'"):
+        read(tmp_path / f"P03{written}", layout)
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,12 @@ from pathlib import Path
 import edfio
 import numpy as np
 import pandas as pd
+import pytest
 
 from existing.writers import RATE_HZ, as_edf, as_fif, recording, without_records
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.existing.analysis import analyse
 from isiw.existing.layout import Layout
 from isiw.existing.look import look
 
@@ -67,3 +71,12 @@ def test_the_columns_of_a_table_are_listed_with_what_they_are_taken_for(tmp_path
     assert "column 'note': x" in str(found)
     assert "--unit with mV, uV or V" in found.missing
     assert not found.missing.startswith("Do ISIs")
+
+
+def test_a_log_says_itself_what_it_holds_and_is_in_the_list_of_what_can_be_read(tmp_path: Path) -> None:
+    space = DesignSpace(0, 100, reference="impact")
+    log = analyse([10, 20, 30, 40], [0.1, 0.2, 0.1, 0.3], space=space, strategy="even").to_log(tmp_path / "P01.mcap")
+    with pytest.raises(InvalidValueError, match=r"says itself what it holds.*isiw show"):
+        look(log)
+    with pytest.raises(InvalidValueError, match=r"or a log \(\.mcap\)"):
+        look(tmp_path / "P01.doc")

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.errors import LogError
+from isiw.errors import InvalidValueError, LogError
 from isiw.existing.analysis import analyse
-from isiw.existing.batch import Person, Way, read_files
+from isiw.existing.batch import Person, Way, analyse_person, read_files
 from isiw.existing.layout import Layout
 
 
@@ -28,6 +28,15 @@ def test_two_codes_that_are_one_file_on_other_systems_are_refused(codes: list[st
     assert [f"{person.refused}".startswith("two of the people or days would have one log") for person in people] == [
         True, True, False
     ]  # fmt: skip
+
+
+def test_two_spellings_of_one_code_are_not_analysed_as_two_people_also_of_those_that_are_wanted(tmp_path: Path) -> None:
+    read_people_of(["P07", "p-07", "P08"], tmp_path)
+    for only, refused in ((None, [True, True, False]), ("P07", [True]), ("P08", [False])):
+        people = read_files([tmp_path / "people.csv"], Way(Layout(reference="impact")), only=only)
+        assert [person.refused is not None for person in people] == refused
+    with pytest.raises(InvalidValueError, match=r"P07 differs .* only in case, spaces.*'p-07'"):
+        analyse_person(read_files([tmp_path / "people.csv"], Way(Layout(reference="impact")))[0], Way())
 
 
 @pytest.mark.parametrize("code", ["CON", "aux.1", "lpt1"])

@@ -361,3 +361,12 @@ def test_tms_alone_has_its_intensity_where_it_is_not_that_of_all_pairs(tmp_path:
     wrong = table.assign(intensity_pct_rmt=table["intensity_pct_rmt"] / 100)
     with pytest.raises(IsiwError, match=r"row 1 .*% of the resting motor threshold"):
         read_people(wrong, IMPACT)
+
+
+def test_pairs_of_several_intensities_are_asked_about() -> None:
+    table = pd.DataFrame({"isi_ms": [10, 20, 30, 40], "mep_mv": 0.2, "intensity_pct_rmt": [110, 110, 130, 130]})
+    with pytest.raises(IsiwError, match=r"several intensities; got '110, 130 % RMT'.*--where \"intensity_pct_rmt=110"):
+        read_people(table, IMPACT)
+    for wanted, count in (("130", 2), ("*", 4)):
+        (person,) = read_people(table, IMPACT.saying(where={"intensity_pct_rmt": wanted}))
+        assert len(person.trials) == count

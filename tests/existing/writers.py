@@ -365,16 +365,16 @@ def as_matlab_73(path: Path, **arrays: Any) -> Path:
     return path
 
 
-def as_statistics(path: Path, label: str = "Peak to peak (µV)") -> Path:
-    """A table with labels of columns, which have the units, and of a value."""
+def as_statistics(path: Path, label: str = "Peak to peak (µV)", of_isis: Mapping[int, str] = {-1: "single"}) -> Path:
+    """A table with labels of columns, which have the units, and of values among the ISIs."""
     frame = pd.DataFrame({"isi": [*ISIS_MS, -1.0], "mep": [1e3 * mep for mep in (*MEPS_MV, 0.3)]})
+    labels = {float(isi) if path.suffix == ".sav" else isi: text for isi, text in of_isis.items()}
     said: dict[str, Any] = {
         "column_labels": ["Interval (ms)", label],
-        "variable_value_labels": {"isi": {-1.0: "single"}},
+        "variable_value_labels": {"isi": labels},
     }
     if path.suffix == ".dta":
         frame["isi"] = frame["isi"].astype(int)
-        said["variable_value_labels"] = {"isi": {-1: "single"}}
         pyreadstat.write_dta(frame, str(path), **said)
     else:
         pyreadstat.write_sav(frame, str(path), **said)

@@ -151,6 +151,8 @@ def replay(
         if len(found) > 1:
             people = isiw.existing.delivered.codes_of([one.delivered for one in found])
             raise isiw.errors.ConfigError("a replay is of one person", got=people, remedy="Say whose: --only CODE.")
+        if found[0].refused is not None:
+            raise found[0].refused
         names = strategy or ["default"]
         progress = Progress(console=Console(stderr=True))
         task = progress.add_task("runs", total=seeds * len(names))

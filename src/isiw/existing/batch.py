@@ -6,7 +6,7 @@ import json
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -19,6 +19,7 @@ from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
 from isiw.existing.reading import read_people
 from isiw.files import folded, hash_of, is_reserved
+from isiw.log.codes import is_same_person, spelling
 from isiw.log.places import log_exists
 from isiw.visit import Visit
 
@@ -73,7 +74,10 @@ def read_files(
 ) -> list[Person]:
     """The people of some files, and where their logs go: one log (.mcap), or a folder for a log of each."""
     everybody = [person for source in sources for person in _read(Path(source), way)]
-    people = [one for one in everybody if only in {None, one.delivered.subject}]
+    codes = dict.fromkeys(one.delivered.subject for one in everybody)
+    times = Counter(map(spelling, codes))
+    people = [one._replace(refused=_spelt_otherwise(code, codes) if times[spelling(code)] > 1 else None)
+              for one in everybody if only in {None, code := one.delivered.subject}]  # fmt: skip
     if only is not None and not people:
         codes = codes_of([one.delivered for one in everybody])
         raise InvalidValueError("no person has this code", got=only, expected=codes)
@@ -124,7 +128,9 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
     stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]
     times = Counter(map(folded, stems))  # names that are two here may be one file on other computers
     return [
-        one._replace(log=Path(output) / f"{stem}.mcap", refused=_no_log_of_its_own(stem, times[folded(stem)]))
+        one._replace(
+            log=Path(output) / f"{stem}.mcap", refused=_no_log_of_its_own(stem, times[folded(stem)]) or one.refused
+        )
         for one, stem in zip(people, stems, strict=True)
     ]
 
@@ -132,6 +138,14 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
 def code_in_names(subject: str) -> str:
     """A person's code as the name of a file can have it, which knows no `/`; an accent is part of its letter."""
     return re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", subject)).strip("._") or "unnamed"
+
+
+def _spelt_otherwise(code: str, codes: Iterable[str]) -> InvalidValueError:
+    """Why one person cannot be analysed as two."""
+    others = ", ".join(other for other in codes if other != code and is_same_person(code, other))
+    what = f"the code {code} differs from another one only in case, spaces, hyphens or underscores"
+    remedy = "For the same person write one code everywhere; for another, one that differs in more."
+    return InvalidValueError(what, got=others, remedy=remedy)
 
 
 def _no_log_of_its_own(stem: str, times: int) -> InvalidValueError | None:

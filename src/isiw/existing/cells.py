@@ -25,7 +25,7 @@ _GROUPED: Final = {
 }
 """By the decimal sign, numbers whose thousands are grouped by the other sign."""
 _NUMBER_BEFORE: Final = re.compile(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*")
-_BLANKS: Final = re.compile(r"(?<=\d)[ '\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}](?=\d{3})")
+_BLANKS: Final = re.compile(r"(?<=\d)[ '’\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}](?=\d{3})")
 _DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")
 _ZONE: Final = re.compile(r":.*(z|utc|gmt|[+-]\d\d:?\d\d)\s*$", re.IGNORECASE)
 _FURTHEST_BEHIND: Final = dt.timedelta(hours=12)  # nowhere on Earth is the time of the day further behind UTC
@@ -96,15 +96,16 @@ class Column:
             raise self.refused(row, "is no number", remedy)
         return value if self.factor == 1.0 else value * self.factor
 
-    def flag(self, row: int) -> bool | None:
-        """True if the cell of a row says yes; None if it is empty."""
+    def flag(self, row: int, yes: str = "counted", no: str = "left out") -> bool | None:
+        """True if the cell of a row says yes, or a word of that kind; None if it is empty."""
         cell = self.cells[row]
         if is_missing(cell):
             return None
         word = str(cell).strip().casefold()
-        if word not in WORDS["yes"] | WORDS["no"]:
+        says = [word in WORDS[usual] | WORDS[kind] for usual, kind in (("yes", yes), ("no", no))]
+        if not any(says):
             raise self.refused(row, "says neither yes nor no", "Use accepted and rejected, or 1 and 0.")
-        return word in WORDS["yes"]
+        return says[0]
 
     def text(self, row: int) -> str:
         """The cell of a row as text; a whole number has no decimal sign."""

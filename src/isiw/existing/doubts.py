@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import Column, says_alone, times_of
+from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import LONGEST_ISI_MS, Delivered
-from isiw.existing.layout import WORDS, Layout, letters
+from isiw.existing.layout import WORDS, Layout, letters, plain
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
@@ -115,8 +115,8 @@ def _is_spread(name: str) -> bool:
 def require_no_verdicts(beside: Iterable[Column]) -> None:
     """Raise if a column of which nothing is read says that a trial does not count."""
     for column in beside:
-        texts = {cell for cell in column.cells if isinstance(cell, str)}
-        if odd := next((text for text in texts if text.strip(" !.").casefold() in WORDS["left out"]), None):
+        texts = {cell: cell.partition(":")[0].strip(" !.?#*()[]") for cell in column.cells if isinstance(cell, str)}
+        if odd := next((text for text, word in texts.items() if word.casefold() in WORDS["left out"]), None):
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(odd), "says that the trial does not count", remedy)
 
@@ -198,11 +198,12 @@ def _require_ascending(columns: Columns) -> None:
 def require_said(columns: Columns) -> None:
     """Raise if it is not stated what rows without an ISI are, or if a row is both a pair and TMS alone."""
     isi, condition, paired = columns["isi"], columns["condition"], columns.paired
-    both = [row for row in paired if columns.layout.alone is None and says_alone(condition.text(row), None)]
-    if both and not all(says_alone(condition.text(row), None) for row in columns.rows):  # one word in all means nothing
-        remedy = "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it is "
-        remedy += "a pair, rename the column."
-        raise condition.refused(both[0], f"says TMS alone, and the ISI there is {isi.text(both[0])}", remedy)
+    one_word = len({*map(plain, map(condition.text, columns.rows))}) == 1  # in all rows it means nothing
+    for row in paired if columns.layout.alone is None else ():
+        if (by := columns.called_alone(row)) is not None and not (by is condition and one_word):
+            remedy = "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it "
+            remedy += "is a pair, rename the column."
+            raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
     empty = [row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None]
     empty = [row for row in empty if "mep" not in columns.of or columns["mep"].number(row) is not None]
     if empty and "asked" not in columns.of:

@@ -8,7 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from itertools import islice, zip_longest
+from itertools import chain, islice, pairwise, zip_longest
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -52,7 +52,7 @@ def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
         return _labelled(path, STATISTICS[suffix])
     if suffix == ".parquet":
         return named(pd.read_parquet(io.BytesIO(_content(path))))
-    return (_workbook if suffix in WORKBOOKS else _texts)(_content(path), layout)
+    return _workbook(_content(path), layout) if suffix in WORKBOOKS else _texts(text_of_file(path), layout)
 
 
 def _content(path: Path) -> bytes:
@@ -64,6 +64,11 @@ def _labelled(path: Path, reader: str) -> pd.DataFrame:
     """A table of SPSS or Stata: labels for values, and what labels of columns say behind their names."""
     read = getattr(library("pyreadstat", "import"), reader)
     frame, said = read(str(path), apply_value_formats=True, formats_as_category=False)
+    for name, labels in said.variable_value_labels.items():
+        kinds = {isinstance(cell, str) for cell in frame[name] if not is_missing(cell)}
+        if (numbers := [label for label in labels.values() if label[:1].isdigit()]) and len(kinds) > 1:
+            what = f"some values of the column {name!r} of {path.name} have numbers as labels, and others have no label"
+            raise InvalidValueError(what, got=", ".join(numbers[:3]), remedy="Give a label to all of its values.")
     names = {}
     for name, label in said.column_names_to_labels.items():
         units = [unit_said(f"x {label or ''}", known) for known in (ISI_UNITS_MS, EMG_UNITS)]
@@ -80,22 +85,34 @@ def named(frame: pd.DataFrame | None) -> pd.DataFrame:
     return frame.set_axis(names, axis=1)
 
 
-def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
-    text = _decoded(content)
+def _texts(text: str, layout: Layout) -> pd.DataFrame:
     if "\0" in text:
         raise InvalidValueError("the file is no text, and so no table that can be read", remedy="Is it the right one?")
     every = [*io.StringIO(text, newline=None)]  # no other sign ends a line, since it may stand in a cell
     lines = every[layout.skip_lines :]
     first = 0 if layout.names else _first(lines, layout)
     title, lines = " ".join(lines[:first]), lines[first:]
-    if lines and lines[0].startswith("#"):  # each part of the file begins so, with names of its own
-        ends = (n for n, line in enumerate(lines) if n and line.startswith("#"))
-        lines = [lines[0].lstrip("# "), *lines[1 : next(ends, None)]]
+    separator = layout.separator or _separator(lines[0].lstrip("# ") if lines else "")
+    if lines and lines[0].startswith("#"):
+        lines = [*_first_part(lines, separator)]
     lines = [line for line in lines if not line.startswith("# ")]
-    separator = layout.separator or _separator(lines[0] if lines else "")
     table = _table([row for row in _split(lines, separator) if row], layout, title)
     table.attrs["head"] = "".join(every[: layout.skip_lines + first])
     return table
+
+
+def _first_part(lines: Sequence[str], separator: str) -> Iterator[str]:
+    """Of parts that begin with a # and names of their own the first one, without trials that a # leaves out."""
+    names, *_ = _split([head := lines[0].lstrip("# ")], separator)
+    yield head
+    for line, below in pairwise([*lines[1:], ""]):
+        if line.startswith("#"):
+            cells, after = ([*chain(*_split([one.lstrip("# ")], separator))] for one in (line, below))
+            if len(cells) == len(after) != len(names):
+                return
+            if cells in ([], names) or cells[0][:1].isdigit():
+                continue
+        yield line
 
 
 def _first(lines: Sequence[str], layout: Layout) -> int:
@@ -107,7 +124,8 @@ def _first(lines: Sequence[str], layout: Layout) -> int:
         if _is_header(names, layout):
             whole = all(len(row) >= len(names) for row in below if row)
             found.append((not whole, separator == _BLANKS, number))
-    return min(found, default=(True, True, 0))[-1]
+    best = min(found, default=(True, True, 0))[-1]
+    return next((number for number, line in enumerate(lines) if line == lines[best]), 0)  # where the names come first
 
 
 def _is_header(cells: Sequence[Any], layout: Layout) -> bool:
@@ -147,7 +165,13 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     return table
 
 
-def _decoded(content: bytes) -> str:
+def text_of_file(path: Path) -> str:
+    """The text in a file."""
+    return decoded(_content(path))
+
+
+def decoded(content: bytes) -> str:
+    """A text, however it is encoded."""
     if content[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         return content.decode("utf-16")
     for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):  # the same without a mark of the order of its bytes

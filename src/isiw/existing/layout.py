@@ -43,11 +43,14 @@ _COLUMNS: Final = {
     "asked": "commandedisi askedisi nominalisi targetisi plannedisi isicommanded isinominal sollisi sollintervall",
     "isi_sd": "isisd",
     "background": "backgroundrms background prestimrms rmsbackground baselinerms hintergrund",
-    "status": "status accepted accept valid include included keep good gültig verwertbar valide válido valido geldig",
-    "exclude": "excluded exclude rejected reject bad artefact artifact ausschluss ausgeschlossen verworfen artefakt "
-               "exclu rejeté artéfact excluido rechazado artefacto escluso scartato artefatto uitgesloten verworpen",
+    "status": "status accepted accept valid include included keep good usable clean gültig verwertbar valide válido "
+              "valido geldig",
+    "exclude": "excluded exclude rejected reject bad artefact artifact artefacts artifacts ausschluss ausgeschlossen "
+               "verworfen artefakt exclu rejeté artéfact excluido rechazado artefacto escluso scartato artefatto "
+               "uitgesloten verworpen",
     "reason": "reason grund",
     "tap_alone": "tapalone",
+    "tms_alone": "tmsalone tmsonly singlepulse singletms pulsealone",
     "intensity": "intensitypctrmt pctrmt intensityrmt percentrmt intensitypercentrmt",
     "subject": "subject subjectid participant participantid subj person patient sub proband probandin "
                "versuchsperson vp teilnehmer teilnehmerin sujet sujeto participante soggetto partecipante proefpersoon "
@@ -62,8 +65,9 @@ COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {key: tuple(names.split()) for k
 """By what they are called in letters alone, the columns that are found without being named; the first name wins."""
 _SETS: Final = {
     "missing": ",nan,(null),na,n/a,none,null,<na>,nat,-,--,–,—,.,?,k.a.,n.d.",
-    "yes": "1,1.0,true,yes,y,x,accepted,accept,ok,good,valid,keep,ja,j,gut,gültig,oui,sí,si,sì",
-    "no": "0,0.0,false,no,n,mistrial,rejected,reject,bad,invalid,excluded,nein,schlecht,ungültig,non,nee",
+    "yes": "1,1.0,true,yes,y,x,ja,j,oui,sí,si,sì",
+    "no": "0,0.0,false,no,n,nein,non,nee",
+    "counted": "accepted,accept,ok,good,valid,keep,gut,gültig",
     "alone": "tms alone,tms only,tms,single,single pulse,single tms,sp,alone,ts,baseline,control,unconditioned,"
              "unpaired,ts alone,ts only,test,test alone,test only,test pulse,test stimulus,no tap,nur tms,tms allein,"
              "einzelpuls,einzelreiz,kontrolle,ohne tap,ohne schlag,tms seule,smt seule,contrôle,tms sola,tms solo,"
@@ -87,8 +91,8 @@ _SETS: Final = {
     "periods": "interval,samplinginterval,sampleinterval,dt",
 }  # fmt: skip
 WORDS: Final[Mapping[str, frozenset[str]]] = {kind: frozenset(words.split(",")) for kind, words in _SETS.items()}
-"""In lower case, what cells say (missing, yes, no, alone, tap alone, left out), and names of columns, in letters alone:
-of spreads and sums, of numbers of trials, vague ones that give way to others, and of rates and periods of sampling."""
+"""In lower case, what cells say (up to left out), and names of columns, in letters alone: of spreads and sums, of
+numbers of trials, vague ones that give way to others, and of rates and periods of sampling."""
 MARKS: Final[Mapping[str, tuple[str, str]]] = {
     "pulse": ("the pulse of TMS", "tms pulse tmspulse magneticpulse"),
     "tap": ("the tap (its impact) or the electrical pulse", "tap impact hit electricalpulse conditioning pns"),

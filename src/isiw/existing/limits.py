@@ -151,16 +151,16 @@ def require_most(source: str, *counts: tuple[str, float, float, str]) -> None:
 
 def limit_memory(memory_mb: float) -> None:
     """Limit the memory that this process may take [MB], where the system can: Linux counts all of it, Windows none."""
-    if resource is not None:
-        _limit(resource.RLIMIT_DATA, int(1e6 * memory_mb))
+    _limit("DATA", 1e6 * memory_mb)
 
 
 def limit_time(seconds: float) -> None:
     """Limit the processor time that this process may take from now on [s], where the system can."""
+    _limit("CPU", math.ceil(time.process_time() + seconds))
+
+
+def _limit(what: str, most: float) -> None:
     if resource is not None:
-        _limit(resource.RLIMIT_CPU, math.ceil(time.process_time() + seconds))
-
-
-def _limit(kind: int, most: int) -> None:
-    _, hard = resource.getrlimit(kind)
-    resource.setrlimit(kind, (most if hard < 0 else min(most, hard), hard))
+        kind = getattr(resource, f"RLIMIT_{what}")
+        _, hard = resource.getrlimit(kind)
+        resource.setrlimit(kind, (int(most if hard < 0 else min(most, hard)), hard))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 import isiw
-from isiw.errors import IsiwError
+from isiw.errors import InvalidValueError, IsiwError
 from isiw.existing import formats
 from isiw.existing.apart import Answer, read_apart
 from isiw.existing.delivered import Delivered
@@ -24,6 +24,8 @@ from isiw.existing.limits import ReadingLimits
 from isiw.existing.markers import marked, names_of, times_of
 from isiw.existing.quantities import Columns
 from isiw.existing.reading import people_of_contents
+from isiw.files import is_mcap
+from isiw.log.places import log_exists
 from isiw.text.sanitize import command, counted
 from isiw.types import FloatArray, Reference
 
@@ -75,6 +77,9 @@ def look(
         InvalidValueError: a format that is not known, or a file that cannot be read.
         ConfigError: a library is not installed.
     """
+    if log_exists(Path(path)) and is_mcap(Path(path)):
+        remedy = f"{command('show', path)} says what is in it, and {command('analyse', path)} analyses it."
+        raise InvalidValueError("this is a log of isiw, and says itself what it holds", got=str(path), remedy=remedy)
     people, said = read_apart(Path(path), layout or Layout(), "", limits or ReadingLimits(), also, look=True)
     sweeps = [isiw.plots.sweeps_figure(one.trials, one.sweeps, one.signals.mep_window_ms, SWEEPS) for one in people[:1]]
     return Look(tuple(said["lines"]), said["command"], said["missing"], *(sweeps or [None]))

@@ -48,7 +48,13 @@ class Columns:
         isi = self.of["isi"]
         if says_alone(isi.cells[row], self.layout.alone):
             return True
-        return says_alone(self["condition"].text(row), None) and (isi.number(row) or 0.0) <= 0
+        return self.called_alone(row) is not None and (isi.number(row) or 0.0) <= 0
+
+    def called_alone(self, row: int) -> Column | None:
+        """The column that calls a row TMS alone, besides that of the ISIs; None if none does."""
+        if self["tms_alone"].flag(row):
+            return self["tms_alone"]
+        return self["condition"] if says_alone(self["condition"].text(row), None) else None
 
     def tap_alone(self, row: int) -> bool:
         """True if a row is a tap alone, by a column for it or by its condition."""
@@ -59,9 +65,13 @@ class Columns:
         """The rows that are not TMS alone."""
         return [row for row in self.rows if not self.tms_alone(row)]
 
+    def excluded(self, row: int) -> bool:
+        """True if a row is marked as excluded, by yes or by a word such as bad."""
+        return bool(self["exclude"].flag(row, "left out", "counted"))
+
     def lost(self, row: int) -> Kind | None:
         """Why a row is marked as lost; None if it is not."""
-        bad = self["exclude"].flag(row) and "status" not in self.of
+        bad = self.excluded(row) and "status" not in self.of
         return Kind.of_mistrial(self["reason"].text(row)) if bad or self["status"].flag(row) is False else None
 
     @classmethod
@@ -84,12 +94,11 @@ class Columns:
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
                 of_units |= units.keys()
         columns, stated = _scaled(columns, layout)
-        if (subject := columns.pop("subject", None)) is not None:
-            is_id = "subject" not in layout.columns and letters(subject.name) == "id"
-            if is_id and 1 < len(frame) == len({*subject.texts}):
-                held["subject"] = None  # each row has one of its own, so that it is of trials and not of people
-            else:
-                columns["subject"] = replace(subject, of_codes=True)
+        for key in [key for key in columns if key not in layout.columns and _is_another(key, columns)]:
+            held[key] = None
+            del columns[key]
+        if "subject" in columns:
+            columns["subject"] = replace(columns["subject"], of_codes=True)
         if "mep" in columns:
             doubts.require_single_trials(columns["mep"], columns["isi"], frame, source)
         beside = {
@@ -97,7 +106,7 @@ class Columns:
             for place, name in enumerate(names)
             if name not in {*held.values(), *of_units} and name.strip()
         }
-        doubts.require_no_verdicts(beside.values())
+        doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})])
         doubts.require_reference(columns["isi"], layout.reference)
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = WORDS["alone"] | WORDS["tap alone"]
@@ -106,6 +115,16 @@ class Columns:
                 beside[condition.name] = of_pairs
         empty = Column("", [None] * len(frame), of=source)
         return cls(columns, _chosen([*columns.values(), *beside.values()], layout), layout, stated, beside, empty)
+
+
+def _is_another(key: str, columns: Mapping[str, Column]) -> bool:
+    """True if a column is of no use as what its name says: an id of each row, reasons of nothing, or amplitudes."""
+    texts = columns[key].texts if key in {"subject", "tms_alone"} else []
+    if key == "subject":
+        return letters(columns[key].name) == "id" and 1 < len(texts) == len({*texts})
+    if key == "tms_alone":
+        return not {*map(str.casefold, texts)} <= {"", *WORDS["yes"], *WORDS["no"]}
+    return key == "reason" and not {"status", "exclude"} & columns.keys()
 
 
 def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:
@@ -153,7 +172,8 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
             stated = next((name for name in names if name.partition(" (")[0] == stated), stated)
         require_one("column", source, stated, names)
         return stated
-    free = [(name, letters(name)) for name in names if name not in layout.columns.values()]
+    free = [(name, letters(re.sub(r"\.\d+$", "", name)))  # so pandas numbers names that come again
+            for name in names if name not in layout.columns.values()]  # fmt: skip
     found = [(known, name) for known in COLUMNS[key] for name, plain_name in free if plain_name == known]
     first = found[0][0] if found else ""
     several = [name for known, name in found

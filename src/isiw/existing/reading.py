@@ -35,6 +35,9 @@ from isiw.types import Reference
 from isiw.visit import Visit
 
 _STRONGEST_PCT_RMT: Final = 300.0  # no stimulator reaches more in a person whose threshold can be found [% RMT]
+_ALWAYS: Final = "reference units longest_isi_ms"
+_OF_ROWS, _OF_SAMPLES = "columns where alone decimal", "channels markers rate_hz mep_window_ms"
+"""What of a layout is used of any file, of rows that say ISIs, and of samples."""
 
 
 def read_people(
@@ -102,25 +105,17 @@ def _require_used(contents: Contents, path: Path | None, layout: Layout) -> None
     """Raise if something is stated that contents of this kind have no use for."""
     of_path = None if path is None else formats.format_of(path)
     in_columns, options = (False, ()) if of_path is None else (of_path.is_table, of_path.options)
-    used: dict[str, AbstractSet[str] | None] = dict.fromkeys(("reference", "units", "longest_isi_ms", *options))
-    if contents.trials is not None:
-        used |= dict.fromkeys(("columns", "where", "alone", "decimal"))
-    if contents.tracks:
-        used |= dict.fromkeys(("channels", "markers", "rate_hz", "mep_window_ms"))
-    kind = "a recording" if contents.tracks else "a table"
-    if contents.tracks and contents.trials is not None:
-        kind = "of sweeps whose ISIs are stated"
-        used |= recordings.OF_SWEEPS
-        if in_columns:
-            used |= {"pulse_at_ms": None, "channels": {"emg"}, "markers": set[str]()}
-        else:
-            used["unmarked"] = None
+    kind, used, keys = "a table", _OF_ROWS, dict[str, AbstractSet[str]]()
+    if contents.tracks and contents.trials is None:
+        kind, used = "a recording", f"{_OF_SAMPLES} unmarked{' decimal' if in_columns else ''}"
+        keys = {"units": {*EMG_UNITS}, "channels": {*CHANNELS} - (set() if in_columns else {"events"})}
     elif contents.tracks:
-        channels = {*CHANNELS} if in_columns else {*CHANNELS} - {"events"}
-        used |= {"unmarked": None, "units": {*EMG_UNITS}, "channels": channels}
-        if in_columns:
-            used["decimal"] = None
-    _require_use(layout, used, "the data" if path is None else path.name, kind)
+        kind, used = "of sweeps whose ISIs are stated", f"{_OF_ROWS} {_OF_SAMPLES}"
+        used += " pulse_at_ms" if in_columns else " unmarked"
+        keys = {**recordings.OF_SWEEPS, **({"channels": {"emg"}, "markers": set()} if in_columns else {})}
+    names = [*_ALWAYS.split(), *used.split(), *options]
+    known: Mapping[str, AbstractSet[str] | None] = {**dict.fromkeys(names), **keys}
+    _require_use(layout, known, "the data" if path is None else path.name, kind)
 
 
 def _require_use(layout: Layout, used: Mapping[str, AbstractSet[str] | None], source: str, kind: str) -> None:
@@ -230,7 +225,7 @@ def _trial(columns: Columns, row: int, number: int, space: DesignSpace, signals:
         "isi_sd_ms": columns["isi_sd"].number(row) or 0.0,
         "mep_mv": mep_mv,
         "background_rms_uv": columns["background"].number(row),
-        "excluded": "status" in columns.of and columns["exclude"].flag(row) is True,
+        "excluded": "status" in columns.of and columns.excluded(row),
     }
     if columns.tap_alone(row):
         return Trial(number, Status.ACCEPTED, tap_alone=True, **{**facts, "commanded_isi_ms": None})
@@ -251,6 +246,13 @@ def _with_intensities(trials: Sequence[Trial], columns: Columns) -> tuple[list[T
             remedy = "It must be in % of the resting motor threshold."
             raise columns.of["intensity"].refused(row, "is no intensity in % RMT", remedy)
     paired = {pct_rmt for trial, pct_rmt in zip(trials, stated, strict=True) if trial.wanted_isi_ms is not None}
+    rows = zip(columns.rows, trials, stated, strict=True)
+    name, texts = columns["intensity"].name, {pct_rmt: columns["intensity"].text(row) for row, trial, pct_rmt in rows
+                                              if trial.wanted_isi_ms is not None and pct_rmt}  # fmt: skip
+    if len(texts) > 1 and name not in columns.layout.where:
+        what, got = f"the pairs of {columns['isi'].of} have several intensities", ", ".join(texts.values())
+        remedy = f'Say --where "{name}={next(iter(texts.values()))}" for one of them, or --where "{name}={doubts.ALL}" '
+        raise InvalidValueError(what, got=f"{got} % RMT", remedy=f"{remedy}if all are to be analysed together.")
     usual, own = paired.pop() if len(paired) == 1 else None, list[Trial]()
     for trial, pct_rmt in zip(trials, stated, strict=True):
         of_alone = trial.wanted_isi_ms is None and not trial.tap_alone and pct_rmt != usual

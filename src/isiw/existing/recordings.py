@@ -35,7 +35,7 @@ _IF_NONE_COUNTS: Final = (
     "hum, at most {:g} µV RMS? See docs/timing.md."
 )
 OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
-    "columns": {"isi", "status", "exclude", "reason", "tap_alone", "subject", "day", "condition"},
+    "columns": {"isi", "status", "exclude", "reason", "tap_alone", "tms_alone", "subject", "day", "condition"},
     "channels": {"emg", "tap", "valve"},
     "markers": {"pulse", "tap", "valve"},
 }

@@ -78,7 +78,7 @@ def format_of(path: Path) -> Format:
         remedy = f"Name its files, all together if the same options hold for them, such as {path}/*.csv."
         raise InvalidValueError("a folder is no file of trials", got=str(path), remedy=remedy)
     if found is None:
-        expected = f"a file of {', '.join(suffix for one in FORMATS for suffix in one.suffixes)}"
+        expected = f"a file of {', '.join(suffix for one in FORMATS for suffix in one.suffixes)}, or a log (.mcap)"
         remedy = "Save or export it as one of these, such as CSV; of BrainVision's files name the .vhdr."
         raise InvalidValueError("this cannot be read", got=path.name, expected=expected, remedy=remedy)
     return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from functools import partial
 from itertools import accumulate
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.contents import Contents, Stretch, Track, with_codes
+from isiw.existing.frames import decoded
 from isiw.existing.layout import Layout
 from isiw.opening import opened
 from isiw.types import FloatArray
@@ -117,6 +117,4 @@ def _header(path: Path) -> _Header:
 
 def _text(field: bytes) -> str:
     """A text as headers and annotations have it."""
-    with suppress(UnicodeDecodeError):
-        return field.decode("utf-8").strip(" \0")
-    return field.decode("latin-1").strip(" \0")
+    return decoded(field.strip(b" \0"))

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, timed, with_codes
+from isiw.existing.frames import text_of_file
 from isiw.existing.layout import Layout
-from isiw.opening import opened
 from isiw.text.named_code import library
 
 _SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}  # numbers in others stay as they are
@@ -31,9 +31,9 @@ def read(path: Path, _layout: Layout) -> Contents:
 
 def _require_whole_markers(path: Path) -> None:
     """Raise if a comma in the text of a marker is not coded, which MNE takes for the end of the text."""
-    said = re.search(r"^MarkerFile=(.*)$", _text(path), re.MULTILINE)
+    said = re.search(r"^MarkerFile=(.*)$", text_of_file(path), re.MULTILINE)
     markers = path.parent / (said[1].strip().replace("$b", path.stem) if said else path.name)
-    for line in _text(markers).splitlines() if markers.is_file() else ():
+    for line in text_of_file(markers).splitlines() if markers.is_file() else ():
         kind, *fields = line.partition("=")[2].split(",")  # of these: text, place, size, channel, and perhaps a date
         is_date = kind != "Comment" or len(fields[-1].strip()) >= _DATE
         dated = len(fields) == 5 and fields[1].strip().isdigit() and is_date
@@ -42,11 +42,6 @@ def _require_whole_markers(path: Path) -> None:
             remedy = "Write that into the .vmrk with an editor; what wrote the file left it out."
             expected = r"\1 in its place, as BrainVision has it"
             raise InvalidValueError(what, got=line.strip(), expected=expected, remedy=remedy)
-
-
-def _text(path: Path) -> str:
-    with opened(path) as file:
-        return file.read().decode("utf-8", errors="replace")
 
 
 def of_raw(raw: Any, source: str = "the recording") -> Contents:
