@@ -116,7 +116,7 @@ class WindowsPrior(Checked):
     length_share: Positive = 0.25
     noise: PositiveLaw = Scale(0.55, 0.2)
     growth: PositiveLaw = Scale(1.7, 0.25)
-    stray: Annotated[float, partial(share, least=0, most=0.5)] = 0.05
+    stray: Annotated[float, partial(share, least=0, most=0.5)] = 0.1
     ensemble: Annotated[int, partial(whole, least=16, most=8192)] = 256
 
     def processes(self, space: DesignSpace) -> tuple[Hyperparameters, Places, Tensor]:
