@@ -5,7 +5,7 @@ Measured in SDs of its share, u = (t - middle) / sd, the profile of each process
     k(u, u') = exp(-(u² + u'²) / 2) (deviation² correlation(|u - u'|) + rise_sd²),
 
 so that its eigenfunctions, found once on a fine grid of u, serve all of them. Those that are left out hold less than
-`LEFT_OUT` of the variance in the middle. With the constant as one more function, a process is known by some twenty
+`LEFT_OUT` of the variance in the middle. With the constant as one more function, a process is known by a dozen
 weights, and whatever the number of trials, what they say about it is a Gaussian law of these.
 """
 
@@ -28,13 +28,13 @@ REACH: Final = 4.5
 STEPS: Final = 40
 """Points of the grid of u in one SD; in between, functions are straight."""
 
-LEFT_OUT: Final = 1e-5
+LEFT_OUT: Final = 1e-4
 """Share of the largest variance that no point of the grid misses more than."""
 
 STRAY: Final = 3.0
 """By how much the noise SD of a stray is larger."""
 
-ROUNDS: Final = 3
+ROUNDS: Final = 2
 """Of finding strays."""
 
 TINY: Final = 1e-300
