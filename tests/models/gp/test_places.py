@@ -23,7 +23,7 @@ from isiw.models.shared.start import StartPrior
 from isiw.testing import check_model
 from known import known
 
-PRIOR = WindowsPrior(start=StartPrior(hit_delay_ms=(180.0, 6.0), p_anywhere=0.0), ensemble=64)
+PRIOR = WindowsPrior(start=StartPrior(hit_delay_ms=(180.0, 6.0), p_anywhere=0.0), stray=0.0, ensemble=64)
 SETTINGS = ProcessSettings("rbf", profile="window", windows=PRIOR)
 SCALE = Standardisation("log", 0.005, math.log(0.012), 1.0)
 MODEL = GaussianProcess(replace(SETTINGS, kernel="matern"), samples=64)

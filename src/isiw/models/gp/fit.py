@@ -161,21 +161,22 @@ class Fit:
         return self._weights(self.processes, self.places, self.noise.log_variance(self.trials.isi_ms))
 
     def _weights(self, processes: Hyperparameters, places: Places, log_variance: Tensor) -> Weights:
-        trials = self.trials
+        trials, own = self.trials, processes.noise.square().unsqueeze(-1)
         # Where a tap changes nothing, it does not change the noise either.
-        changed = log_variance * (processes.amplitude > 0).unsqueeze(-1)
-        relative = self._relative_variance(processes, places, changed)
+        changed = log_variance * (processes.amplitude > 0).unsqueeze(-1) + 2.0 * places.log_growth(trials.isi_ms)
+        # What an ISI is off by moves a trial along the flank [McHutchon2011].
+        variance = own * changed.exp() + (places.slope(trials.isi_ms) * trials.isi_sd_ms).square()
         tapped = features(functions(self.settings.kernel, self.settings.windows), places, trials.isi_ms)
         alone = tapped.new_zeros(len(tapped), len(trials.alone), tapped.shape[-1])
         alone[..., -1] = 1.0
         about = trials.values - places.mean(trials.isi_ms)
-        own = processes.noise.square().unsqueeze(-1)
-        return Weights(
+        told = Weights(
             features=torch.cat((tapped, alone), dim=-2),
             values=torch.cat((about, trials.alone.expand(len(about), -1)), dim=-1),
-            variance=torch.cat((own * relative, own.expand(-1, len(trials.alone))), dim=-1),
+            variance=torch.cat((variance, own.expand(-1, len(trials.alone))), dim=-1),
             level_sd=LEVEL_SD,
         )
+        return told.with_strays(self.settings.windows.stray)
 
     @property
     def log_evidence(self) -> float:
@@ -218,15 +219,6 @@ class Fit:
         relative = torch.nn.functional.pad(relative, (0, alone), value=1.0)
         return LEVEL_SD**2 + padded + torch.diag_embed(processes.noise.square().unsqueeze(-1) * relative)
 
-    def _relative_variance(self, processes: Hyperparameters, places: Places | None, log_variance: Tensor) -> Tensor:
-        """Noise variance of the trials with a tap, relative to that of TMS alone, (..., n)."""
-        if places is None:
-            return log_variance.exp()
-        isi_ms, sd_ms = self.trials.isi_ms, self.trials.isi_sd_ms
-        # What an ISI is off by moves a trial along the flank [McHutchon2011].
-        blur = (places.slope(isi_ms) * sd_ms / processes.noise.unsqueeze(-1)).square()
-        return torch.exp(log_variance + 2.0 * places.log_growth(isi_ms)) + blur
-
     def surprise(self, log_variance: Tensor) -> Tensor:
         """Leave-one-out residuals of the trials with a tap under the best process [SD], shape (n,)."""
         pick = torch.tensor([self.best])
@@ -250,7 +242,10 @@ class Fit:
         """Some of the processes as BoTorch models, from ISIs [ms] to standardised MEPs."""
         chosen, trials = self.processes.picked(picks), self.trials
         places = None if self.places is None else self.places.picked(picks)
-        relative = self._relative_variance(chosen, places, self.noise.log_variance(trials.isi_ms))
+        relative = self.noise.log_variance(trials.isi_ms).exp()
+        if self.weights is not None:
+            own = self.weights.variance[picks][..., : len(trials.isi_ms)]
+            relative = own / chosen.noise.square().unsqueeze(-1)
         level, data = self.level(chosen.noise), (trials.isi_ms, trials.values, relative)
         return regression(self.settings.kernel, chosen, level, *data, places=places)
 

@@ -14,7 +14,7 @@ from typing import Annotated, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from isiw.checks import Checked, Positive, number, whole
+from isiw.checks import Checked, Positive, number, share, whole
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.shared.scales import PositiveLaw, Scale
@@ -103,6 +103,8 @@ class WindowsPrior(Checked):
         noise: SD of the log MEP outside the window.
         growth: ratio of its SD in the middle of the window and outside; near the motor threshold a stimulus in the
             window evokes much, or nothing.
+        stray: share of trials whose log MEP scatters three times as far: outside the window most stimuli evoke nothing,
+            and a few evoke much.
         ensemble: how many processes with a window stand for the prior.
     """
 
@@ -114,6 +116,7 @@ class WindowsPrior(Checked):
     length_share: Positive = 0.25
     noise: PositiveLaw = Scale(0.55, 0.2)
     growth: PositiveLaw = Scale(1.7, 0.25)
+    stray: Annotated[float, partial(share, least=0, most=0.5)] = 0.1
     ensemble: Annotated[int, partial(whole, least=16, most=8192)] = 256
 
     def processes(self, space: DesignSpace) -> tuple[Hyperparameters, Places, Tensor]:

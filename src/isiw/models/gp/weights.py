@@ -5,14 +5,14 @@ Measured in SDs of its share, u = (t - middle) / sd, the profile of each process
     k(u, u') = exp(-(u² + u'²) / 2) (deviation² correlation(|u - u'|) + rise_sd²),
 
 so that its eigenfunctions, found once on a fine grid of u, serve all of them. Those that are left out hold less than
-`LEFT_OUT` of the variance in the middle. With the constant as one more function, a process is known by some twenty
+`LEFT_OUT` of the variance in the middle. With the constant as one more function, a process is known by a dozen
 weights, and whatever the number of trials, what they say about it is a Gaussian law of these.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Final
 
@@ -28,8 +28,14 @@ REACH: Final = 4.5
 STEPS: Final = 40
 """Points of the grid of u in one SD; in between, functions are straight."""
 
-LEFT_OUT: Final = 1e-5
+LEFT_OUT: Final = 1e-4
 """Share of the largest variance that no point of the grid misses more than."""
+
+STRAY: Final = 3.0
+"""By how much the noise SD of a stray is larger."""
+
+ROUNDS: Final = 2
+"""Of finding strays."""
 
 TINY: Final = 1e-300
 
@@ -80,6 +86,25 @@ class Weights:
     values: Tensor  # less the mean of each process, (q, n)
     variance: Tensor  # of their noise, (q, n)
     level_sd: float  # prior SD of the constant
+    surplus: Tensor | float = 0.0  # of the log marginal likelihood over that of Gaussian noise, (q,)
+
+    def with_strays(self, share: float) -> Weights:
+        """The same if that share of the values, it is not known which, have `STRAY` times the noise SD.
+
+        By variational inference [Bishop2006, section 10.1]: in turns, a value is as likely a stray as its expected
+        squared distance from the profile says, and counts as much as that leaves of its noise.
+        """
+        if not share:
+            return self
+        odds, less = math.log(share / (1.0 - share)) - math.log(STRAY), 1.0 - STRAY**-2
+        stray = torch.full_like(self.variance, share)
+        for _ in range(ROUNDS):
+            away, spread = replace(self, variance=self.variance / (1.0 - less * stray)).left
+            stray = torch.sigmoid(odds + 0.5 * less * (away.square() + spread) / self.variance)
+        wider = 1.0 / (1.0 - less * stray)
+        # Of the bound on the evidence, what Gaussian noise that is so much wider does not have.
+        bound = torch.xlogy(stray, share / (STRAY * stray)) + torch.xlogy(1.0 - stray, (1.0 - share) / (1.0 - stray))
+        return replace(self, variance=self.variance * wider, surplus=(bound + 0.5 * wider.log()).sum(-1))
 
     @cached_property
     def factor(self) -> Tensor:
@@ -102,15 +127,21 @@ class Weights:
         """Log marginal likelihood of the values, (q,) [Rasmussen2006, equations 2.30 and A.9 to A.10]."""
         noise = (self.values.square() / self.variance + self.variance.log() + math.log(2.0 * math.pi)).sum(-1)
         pivots = self.factor.diagonal(dim1=-2, dim2=-1).log().sum(-1)
-        return 0.5 * (self.white.square().sum(-1) - noise) - pivots - math.log(self.level_sd)
+        gaussian = 0.5 * (self.white.square().sum(-1) - noise) - pivots - math.log(self.level_sd)
+        return gaussian + self.surplus
+
+    @cached_property
+    def left(self) -> tuple[Tensor, Tensor]:
+        """What the profile's mean leaves of each value, and the profile's variance there, (q, n) each."""
+        mean = torch.linalg.solve_triangular(self.factor.mT, self.white.unsqueeze(-1), upper=True)
+        white = torch.linalg.solve_triangular(self.factor, self.features.mT, upper=False)
+        return self.values - (self.features @ mean).squeeze(-1), white.square().sum(-2)
 
     @property
     def surprise(self) -> Tensor:
         """Distance of each value from what all others predict [SD], (q, n) [Rasmussen2006, equations 5.10 to 5.12]."""
-        mean = torch.linalg.solve_triangular(self.factor.mT, self.white.unsqueeze(-1), upper=True)
-        spread = torch.linalg.solve_triangular(self.factor, self.features.mT, upper=False).square().sum(-2)
-        about = self.values - (self.features @ mean).squeeze(-1)
-        surprise: Tensor = about / (self.variance - spread).clamp_min(TINY).sqrt()
+        away, spread = self.left
+        surprise: Tensor = away / (self.variance - spread).clamp_min(TINY).sqrt()
         return surprise
 
     def drawn(self, picks: Tensor, rng: np.random.Generator) -> Tensor:
