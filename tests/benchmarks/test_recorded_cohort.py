@@ -166,6 +166,6 @@ def test_the_recordings_are_of_ten_people_who_come_in_turn(shared_data: Path) ->
 def test_smoothing_keeps_the_variance_of_the_log_amplitudes_that_were_recorded(shared_data: Path) -> None:
     curves = banks(shared_data)
     recorded = [np.log(level + ADDED_MV) for bank in curves for level in bank.amplitudes_mv]
-    kernels = np.concatenate([smoothed(bank, curves).kernel_log_sds for bank in curves])  # type: ignore[arg-type]
+    kernels = np.concatenate([smoothed(bank, curves).kernel_log_sds for bank in curves])
     of_law = np.mean([logs.var() + sd**2 for logs, sd in zip(recorded, kernels, strict=True)])
     assert of_law == pytest.approx(np.mean([logs.var(ddof=1) for logs in recorded]), rel=0.03)
