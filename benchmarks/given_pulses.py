@@ -10,8 +10,9 @@ The people are those of `recruitment`, whose pairs are given at 90 % RMT. Before
 each number of them: at the same level, and as pulses of a level that may be another. `--known` examines them without
 pulses, but with a prior that knows what pulses could at most teach (the person's curve, kind of noise and EMG floor),
 what they cannot (the law of the cohort's windows), and both. With `--wrong` the pulses, stated as of the same level,
-are the right ones, and of each curve of `WRONG`. `--recorded` examines people whose MEPs were recorded instead, the
-pulses being of the half that pairs are not drawn from (`benchmarks.recorded_people`). All F1 are of the same people,
+are the right ones, and of each curve of `wrong_curves`. `--recorded` examines people whose MEPs were recorded instead,
+the pulses being of the law that pairs are drawn from, or with `--banks coils` of the other half of the pulses
+(`benchmarks.recorded_people`). All F1 are of the same people,
 and pairs have the same noise. Standard errors are by person. Rows are kept beside `--out` as people are done, and the
 same command continues where it was interrupted. Reported people come from seed 190,000 on; seeds below 1,000 are for
 work.
@@ -34,7 +35,7 @@ import typer
 import isiw
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
-from benchmarks.recorded_people import RecordedPerson, recordings
+from benchmarks.recorded_people import Banks, RecordedPerson, recordings
 from benchmarks.recorded_tables import error_by_person
 from benchmarks.tables import kept, write_table
 from isiw.metrics import f1
@@ -124,7 +125,7 @@ class Examined:
 
     @classmethod
     def recorded(cls, person: RecordedPerson) -> Examined:
-        """One whose MEPs were recorded; pulses are of the half that pairs are not drawn from."""
+        """One whose MEPs were recorded; pulses are of the same law as pairs, or of the other half of a coil's."""
         bank = person.bank.half("other")
 
         def pulse(pct_rmt: float, number: int) -> float:
@@ -235,11 +236,17 @@ def session(subject: SimulatedSubject, seed: int, strategy: Strategy) -> dict[st
     return found
 
 
-def examined(people: int, seed: int, *, recorded: bool) -> list[tuple[Examined, Examined]]:
-    """The people, and beside each whose curve stands for that of another muscle: of recorded people the next one's."""
-    if recorded:
-        cohort = [Examined.recorded(RecordedPerson(number, seed, recordings())) for number in range(people + 1)]
-        return list(pairwise(cohort))
+def examined(people: int, seed: int, banks: Banks | None = None) -> list[tuple[Examined, Examined]]:
+    """The people, and beside each whose curve stands for that of another muscle: of recorded people the next one's.
+
+    Args:
+        people: how many.
+        seed: of the cohort.
+        banks: what a bank of recorded people is; None for people of `recruitment`.
+    """
+    if banks is not None:
+        cohort = [RecordedPerson(number, seed, recordings(), banks=banks) for number in range(people + 1)]
+        return list(pairwise(map(Examined.recorded, cohort)))
     subjects = enumerate(isiw.subjects.cohort("recruitment", people, seed))
     return [
         (
@@ -272,6 +279,7 @@ def main(
     known: Annotated[bool, typer.Option("--known", help="No pulses, but priors that know parts of the truth.")] = False,
     wrong: Annotated[bool, typer.Option("--wrong", help="Pulses of wrong curves beside the right one.")] = False,
     recorded: Annotated[bool, typer.Option("--recorded", help="People whose MEPs were recorded.")] = False,
+    banks: Annotated[str, typer.Option(help="What a bank of theirs is: curves or coils.")] = "curves",
 ) -> None:
     """Print how the sessions compare."""
     torch.set_num_threads(1)
@@ -280,9 +288,9 @@ def main(
         return
     if recorded and known:
         raise typer.BadParameter("who was recorded has no law that a prior could know")
-    cohort, counts = examined(people, seed, recorded=recorded), pulses or [30, 60]
+    cohort, counts = examined(people, seed, cast("Banks", banks) if recorded else None), pulses or [30, 60]
     what = "known" if known else "wrong" if wrong else "right"
-    whose = "recorded" if recorded else "recruitment"
+    whose = f"recorded-{banks}" if recorded else "recruitment"
     folder = out.with_suffix(f".{what}-{'-'.join(map(str, counts))}-{whose}-{seed}.rows")
 
     def row_of(number: int) -> pd.DataFrame:

@@ -3,11 +3,12 @@
     python -m benchmarks.recorded_cohort --people 400 --seed 10000 --given 0 --out benchmarks/results/recorded_cohort
 
 The recordings lie in no repository of ours: `--data`, or the variable ISIW_SHARED_DATA, names their folder. `--given
-0,10,30,60,600` gives the default so many single pulses of the other half first; `--fitted` adds the default with the
-prior that `benchmarks.response_prior` fitted to all other persons. `--made-up 10` puts hands of the default's own law
+0,10,30,60,600` gives the default so many single pulses of the same law first; `--fitted` adds the default with the
+prior that `benchmarks.response_prior` fitted to all other persons. `--banks coils` draws from both curves of a coil,
+trials from every second pulse and what is known from the other half. `--made-up 10` puts hands of the default's own law
 in the place of who was recorded, so many pulses a level. Sessions are kept beside the result as they finish,
 and the same command continues where it was interrupted. Standard errors are by bootstrap over the ten persons, each
-with all coils. Seeds below 1,000 are for work.
+with all banks. Seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, cast
 
 import numpy as np
 import pandas as pd
@@ -30,7 +31,7 @@ import isiw
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.recorded_law import KnowsTheLaw
-from benchmarks.recorded_people import RecordedPerson, recordings
+from benchmarks.recorded_people import Banks, RecordedPerson, recordings
 from benchmarks.recorded_tables import tables_of
 from benchmarks.response_prior import Fit, read_folds
 from benchmarks.tables import kept, write_tables
@@ -83,17 +84,21 @@ class RecordedSession:
         return strategy
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row a mark."""
+        """One row a mark, each also with where the player's own stopping rule fired first."""
         subject, player = self.person.subject(), self.player()
         responder, truth = subject.begin(self.person.seed + self.person.number), subject.window(SPACE)
-        rows = []
+        rows, stop = [], dict[str, Any]()
         for trial in range(self.trials + 1):
+            estimate = player.estimate()
             if trial in MARKS:
-                rows.append(self._row(trial, player.estimate(), truth))
+                rows.append(self._row(trial, estimate, truth))
+            stopped = hasattr(player, "decision") and player.decision().stop
+            if not stop and (stopped or trial == self.trials):
+                stop = {"stop_pairs": trial, "stopped": stopped, "stop_f1": isiw.metrics.f1(estimate, truth, SPACE)}
             if trial < self.trials:
                 response = responder.respond(player.ask(), SPACE.reference)
                 player.tell(response.isi_ms, response.mep_mv)
-        return rows
+        return [row | stop for row in rows]
 
     def _row(self, trial: int, estimate: isiw.WindowEstimate, truth: isiw.Window | None) -> dict[str, Any]:
         bank, covered = self.person.bank, isiw.metrics.covers(estimate, truth, SPACE)
@@ -136,6 +141,8 @@ def chunks(
 ) -> list[Chunk]:
     """All sessions: the default with so many pulses first, with fitted priors, and who knows the law.
 
+    Where banks are split in halves there is also who knows the half that trials are drawn from.
+
     Args:
         people: the cohort.
         given: numbers of single pulses.
@@ -143,7 +150,9 @@ def chunks(
         folder: where rows are kept.
         folds: the fit without each person; None for no fitted priors.
     """
-    plan = [("default", count) for count in given] + [(LAW, 0), (TOO_GOOD, 0)]
+    plan = [("default", count) for count in given] + [(LAW, 0)]
+    if people[0].bank.kernel_log_sds is None:
+        plan.append((TOO_GOOD, 0))
     plan += [(FITTED, count) for count in given if folds]
     fits = folds or {}
     names = {strategy: re.sub("[^a-z]+", "_", strategy) for strategy, _ in plan}
@@ -163,13 +172,14 @@ def chunks(
 
 
 def main(  # noqa: PLR0913, PLR0917 - options of a command line
-    people: Annotated[int, typer.Option(help="Sessions of each strategy; the thirty banks come in turn.")] = 400,
+    people: Annotated[int, typer.Option(help="Sessions of each strategy; the banks come in turn.")] = 400,
     seed: Annotated[int, typer.Option(help="Seed of windows, rigs and draws.")] = 10_000,
     given: Annotated[str, typer.Option(help="Numbers of single pulses given first, comma-separated.")] = "0",
     trials: Annotated[int, typer.Option(help="Pairs a session.")] = MARKS[-1],
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     data: Annotated[Path | None, typer.Option(help="Folder of the recordings.")] = None,
     fitted: Annotated[Path | None, typer.Option(help="JSON of benchmarks.response_prior, with its folds.")] = None,
+    banks: Annotated[str, typer.Option(help="What a bank is: curves or coils.")] = "curves",
     made_up: Annotated[int | None, typer.Option(help="Pulses a level of people of the default's own law.")] = None,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("recorded_cohort"),
 ) -> None:
@@ -178,8 +188,9 @@ def main(  # noqa: PLR0913, PLR0917 - options of a command line
     if not data.is_dir():
         print(f"Skipped: the recordings are not at hand, {data} is no folder. Name it with --data.")
         return
-    cohort = [RecordedPerson(number, seed, data, made_up) for number in range(people)]
-    folder = out.with_suffix(f".{seed}-{trials}{'' if made_up is None else f'-{made_up}'}.sessions")
+    kind = cast("Banks", "coils" if made_up else banks)
+    cohort = [RecordedPerson(number, seed, data, made_up, kind) for number in range(people)]
+    folder = out.with_suffix(f".{seed}-{trials}-{banks}{'' if made_up is None else f'-{made_up}'}.sessions")
     folder.mkdir(parents=True, exist_ok=True)
     folds = None if fitted is None else read_folds(json.loads(fitted.read_text(encoding="utf-8")))
     units, found = chunks(cohort, [int(each) for each in given.split(",")], trials, folder, folds), []

@@ -1,8 +1,8 @@
 """Who knows a recorded person's law: all but start and width of the window.
 
-Known are the impact, the boost, the form of the profile, and of each intensity a histogram of recorded amplitudes and
-their mean, from the half of the pulses that trials are not drawn from. It designs by greedy mutual information on a
-5 ms grid and reports the level set of largest posterior expected F1.
+Known are the impact, the boost, the form of the profile, and of each intensity a histogram of amplitudes and their
+mean: those of the smoothed law that trials are drawn from, or of the half that they are not drawn from. It designs by
+greedy mutual information on a 5 ms grid and reports the level set of largest posterior expected F1.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import norm
 
 from benchmarks.oracle import LEVELS, Hypotheses, every_5_ms, nearest_levels
-from benchmarks.recorded_people import STARTS_MS, WIDTHS_MS, Bank, RecordedResponse
+from benchmarks.recorded_people import ADDED_MV, STARTS_MS, WIDTHS_MS, Bank, RecordedResponse
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.excess import least_excess_mv
@@ -21,8 +21,8 @@ from isiw.subjects import SimulatedSubject
 from isiw.types import FloatArray
 
 BINS = 24
-ADDED_MV = 0.002
-SPREAD_EVENLY = 0.02
+SPREAD_EVENLY, LEAST_SPREAD = 0.02, 1e-9
+"""How much probability lies in all bins alike: of the law by half of the pulses, and of one that is known exactly."""
 
 
 def windows() -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -43,17 +43,20 @@ def _logs(amplitudes_mv: FloatArray) -> FloatArray:
 def histograms(bank: Bank) -> tuple[FloatArray, FloatArray]:
     """Inner edges of the bins of the log amplitude, shape (23,), and the probability of each bin by level, (k, 24).
 
+    Of a smoothed bank they are those of its law, of another one a law is made of the amplitudes.
+
     Args:
         bank: what was recorded.
     """
     logs = [_logs(level) for level in bank.amplitudes_mv]
     every = np.concatenate(logs)
     edges = np.linspace(every.min(), every.max(), BINS + 1)[1:-1]
-    below = np.stack(
-        [norm.cdf((edges - each[:, None]) / _bandwidth(each, edges[1] - edges[0])).mean(0) for each in logs]
-    )
+    known = bank.kernel_log_sds is not None
+    sds = bank.kernel_log_sds if known else [_bandwidth(each, edges[1] - edges[0]) for each in logs]
+    spread = LEAST_SPREAD if known else SPREAD_EVENLY
+    below = np.stack([norm.cdf((edges - each[:, None]) / sd).mean(0) for each, sd in zip(logs, sds, strict=True)])
     mass = np.diff(below, axis=1, prepend=0.0, append=1.0)
-    return edges, (1.0 - SPREAD_EVENLY) * mass + SPREAD_EVENLY / BINS
+    return edges, (1.0 - spread) * mass + spread / BINS
 
 
 def _bandwidth(logs: FloatArray, bin_width: float) -> float:
@@ -67,7 +70,8 @@ class KnowsTheLaw:
     """One session of who knows the law with one person.
 
     Args:
-        subject: the person as far as known: responses of the half that the law is from; start and width are not used.
+        subject: the person as far as known: responses of the bank or half that the law is from; neither start nor width
+            is used.
         space: the design space, from the valve command.
     """
 

@@ -1,13 +1,16 @@
 """People whose MEPs were recorded: a trial is one recorded amplitude at the intensity that facilitation makes of 90 %.
 
 The recordings, single pulses over recruitment curves of ten people under three coils each [OfirGeva], are in no
-repository of ours: a folder of them is handed over. Trials are drawn from every second pulse of a level, so that the
-other half can say what was known beforehand. A person is left out, and drawn for errors, with all three coils.
+repository of ours: a folder of them is handed over. A bank is one recruitment curve, five pulses a level, smoothed: its
+trials, and pulses that are given first, are drawn from the same law. Or a bank is all of a coil, which is two curves:
+trials are then drawn from every second pulse of a level, and the other half says what was known beforehand. A person is
+left out, and drawn for errors, with all banks.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -33,7 +36,14 @@ STATED_HIT_DELAY_MS: Final = (180.0, 8.0)
 NO_FLOOR: Final = EmgFloor(1e-6, 0.0)
 """A recorded sweep has its floor already."""
 
+ADDED_MV: Final = 0.002
+"""What is added to an amplitude before its logarithm is taken [mV]."""
+LEAST_PULSES, LEAST_LEVELS = 3, 5
+"""Curves with fewer pulses at a level, or with fewer levels, are left out."""
+
 Half: TypeAlias = Literal["drawn", "other"]
+Banks: TypeAlias = Literal["curves", "coils"]
+"""What a bank is: a smoothed recruitment curve, or both curves of a coil, split in halves."""
 
 
 def recordings() -> Path:
@@ -51,22 +61,33 @@ class Bank:
         coil: the coil.
         levels_pct_rmt: intensities that pulses were given at [% RMT], ascending, shape (k,).
         amplitudes_mv: those of each level in the order of recording [mV], k arrays.
+        kernel_log_sds: SD of the normal law of log(amplitude + 2 µV) around each of them, by level, shape (k,); None
+            for the amplitudes themselves.
     """
 
     person: int
     coil: str
     levels_pct_rmt: FloatArray
     amplitudes_mv: tuple[FloatArray, ...]
+    kernel_log_sds: FloatArray | None = None
 
     def half(self, which: Half) -> Bank:
-        """Every second pulse of each level: the first, third ... are those that trials are drawn from."""
+        """Every second pulse of each level: the first, third ... are those that trials are drawn from.
+
+        A smoothed bank is a law, and has no halves: all of it is either.
+        """
+        if self.kernel_log_sds is not None:
+            return self
         first = ("drawn", "other").index(which)
         return replace(self, amplitudes_mv=tuple(level[first::2] for level in self.amplitudes_mv))
 
     @property
     def means_mv(self) -> FloatArray:
         """Mean amplitude of each level [mV], shape (k,)."""
-        return np.array([level.mean() for level in self.amplitudes_mv])
+        means_mv = np.array([level.mean() for level in self.amplitudes_mv])
+        if self.kernel_log_sds is None:
+            return means_mv
+        return np.asarray((means_mv + ADDED_MV) * np.exp(0.5 * self.kernel_log_sds**2) - ADDED_MV)
 
     def places(self, intensity_pct_rmt: ArrayLike) -> FloatArray:
         """Where intensities lie among the levels, 1.5 being halfway from the second to the third; same shape."""
@@ -76,23 +97,59 @@ class Bank:
     def drawn_mv(self, place: float, rng: np.random.Generator) -> float:
         """One amplitude of the level below or above a place [mV], the nearer the more probable."""
         which, among = rng.random(2)
-        level = self.amplitudes_mv[int(place + which)]
-        return float(level[int(among * len(level))])
+        number = int(place + which)
+        level = self.amplitudes_mv[number]
+        drawn_mv = float(level[int(among * len(level))])
+        if self.kernel_log_sds is None:
+            return drawn_mv
+        factor = float(np.exp(self.kernel_log_sds[number] * rng.standard_normal()))
+        return max(0.0, (drawn_mv + ADDED_MV) * factor - ADDED_MV)
 
 
 @cache
-def banks(folder: Path) -> tuple[Bank, ...]:
-    """The banks of all people, coil by coil, so that the first ten are of ten people.
+def banks(folder: Path, kind: Banks = "curves") -> tuple[Bank, ...]:
+    """The banks of all people as they were recorded, coil by coil, so that the first ten are of ten people.
 
     Args:
         folder: of the recordings.
+        kind: of the banks. Where the numbers of pulses begin again, another curve does.
     """
     table = pd.read_csv(folder / "shayofir" / "fdi_recruitment_trials.csv").query("use == 1")
+    coils = [table["coil"], table["person"]]
+    again = table["pulse"].groupby(coils).diff() <= 0
+    table = table.assign(curve=again.groupby(coils).cumsum() if kind == "curves" else 0)
     found = []
-    for (coil, person), pulses in table.groupby(["coil", "person"]):
+    for (coil, _, person), pulses in table.groupby(["coil", "curve", "person"]):
         levels = {level: rows["mep_mv"].to_numpy() for level, rows in pulses.groupby("intensity_pct_rmt")}
-        found.append(Bank(int(person), str(coil), np.array(list(levels), dtype=float), tuple(levels.values())))
+        if kind == "coils" or (len(levels) >= LEAST_LEVELS and min(map(len, levels.values())) >= LEAST_PULSES):
+            found.append(Bank(int(person), str(coil), np.array(list(levels), dtype=float), tuple(levels.values())))
     return tuple(found)
+
+
+def smoothed(bank: Bank, others: Iterable[Bank]) -> Bank:
+    """A curve whose log amplitudes have at each level the variance that its pulses say, without gaps between them.
+
+    Around each of n pulses lies a normal law with the SD of the person's pulses about the means of their levels, at
+    this intensity in all curves, over the root of n: so much the n pulses themselves vary too little.
+
+    Args:
+        bank: the curve.
+        others: all curves, those of the same person among them.
+    """
+    own = [each for each in others if each.person == bank.person]
+
+    def log_sd(pct_rmt: float) -> float:
+        alike = [
+            np.log(level + ADDED_MV)
+            for each in own
+            for at, level in zip(each.levels_pct_rmt.tolist(), each.amplitudes_mv, strict=True)
+            if round(at, -1) == round(pct_rmt, -1)
+        ]
+        squares = sum(float(((logs - logs.mean()) ** 2).sum()) for logs in alike)
+        return float(np.sqrt(squares / sum(len(logs) - 1 for logs in alike)))
+
+    counts = np.array([len(level) for level in bank.amplitudes_mv])
+    return replace(bank, kernel_log_sds=np.array([log_sd(at) for at in bank.levels_pct_rmt.tolist()]) / np.sqrt(counts))
 
 
 def made_up(bank: Bank, pulses: int, rng: np.random.Generator) -> Bank:
@@ -119,7 +176,7 @@ def made_up(bank: Bank, pulses: int, rng: np.random.Generator) -> Bank:
 
 @dataclass(frozen=True, eq=False)
 class RecordedResponse:
-    """The response of a person to the pulses of pairs, a recorded amplitude each; half of a bank.
+    """The response of a person to the pulses of pairs, an amplitude of a bank each.
 
     Args:
         bank: what is drawn from.
@@ -154,23 +211,26 @@ class RecordedPerson:
         seed: of the cohort.
         folder: of the recordings.
         pulses: how many a level a made-up person has, in the place of who was recorded; None for who was.
+        banks: what a bank is.
     """
 
     number: int
     seed: int
     folder: Path
     pulses: int | None = None
+    banks: Banks = "curves"
 
     @cached_property
     def bank(self) -> Bank:
-        """All that was recorded."""
-        all_banks = banks(self.folder)
+        """All that was recorded, or its law."""
+        all_banks = banks(self.folder, self.banks)
         recorded = all_banks[self.number % len(all_banks)]
-        rng = np.random.default_rng([self.seed, self.number, 3])
-        return recorded if self.pulses is None else made_up(recorded, self.pulses, rng)
+        if self.pulses is not None:
+            return made_up(recorded, self.pulses, np.random.default_rng([self.seed, self.number, 3]))
+        return smoothed(recorded, all_banks) if self.banks == "curves" else recorded
 
     def subject(self, half: Half = "drawn") -> SimulatedSubject:
-        """The person whose responses are those of one half."""
+        """The person whose responses are those of the bank, or of one half of it."""
         rng = np.random.default_rng([self.seed, self.number])
         median_ms, log_sd, *ends_ms = WIDTHS_MS
         boost_pct_rmt, start_ms, hit_delay_ms, sd_ms = (
@@ -186,7 +246,7 @@ class RecordedPerson:
         )
 
     def single_pulses(self, count: int) -> list[tuple[float, float]]:
-        """Pulses alone given first: intensity [% RMT] and amplitude [mV] of each, from the other half.
+        """Pulses alone given first: intensity [% RMT] and amplitude [mV] of each, from the bank or its other half.
 
         All levels in turn, in a new random order each time round; of more pulses the first ones are the same.
 

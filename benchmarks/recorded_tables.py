@@ -19,6 +19,8 @@ SURE, TOO_SURE = 0.7, 0.35
 """Sure and wrong: the expected F1 is at least so much, and so much above the actual."""
 
 BELIEVES = "believes "
+NOTHING = "default"
+"""What its rows are called where nothing was given before the pairs."""
 
 
 def error_by_person(values: pd.Series, persons: pd.Series) -> float:
@@ -55,40 +57,70 @@ def tables_of(
     """
     rows = rows.assign(sure_and_wrong=sure_and_wrong(rows).astype(float))
     rows["too_sure"] = rows["expected_f1"] - rows["f1"]
-    lead = rows[rows["strategy"] == law].set_index(["number", "pairs"])["f1"]
-    same = pd.MultiIndex.from_frame(rows[["number", "pairs"]])
-    rows["behind_the_law"] = lead.reindex(same).to_numpy() - rows["f1"]
+    rows["behind_the_law"] = -_more_than(rows, law, "f1")
+    rows["gain"] = _more_than(rows, NOTHING, "f1")
     asked = rows[rows["pairs"] > 0]
     return {
         "By pairs": pd.DataFrame([_by_pairs(*key, part) for key, part in asked.groupby(["strategy", "pairs"])]),
+        "At the stopping rule": _at_stopping(rows[rows["pairs"] == 0]),
         "Without any pair": _without_any(rows, people, space),
         "By person": pd.DataFrame([_by_person(*key, part) for key, part in _of_default(asked, "person")]),
         "What it believes": pd.DataFrame([_believed(*key, part) for key, part in _of_default(asked, "sure_and_wrong")]),
     }
 
 
+def _more_than(rows: pd.DataFrame, other: str, figure: str) -> pd.Series:
+    """By how much a figure is larger than that of another strategy in the same session after as many pairs."""
+    of_other = rows[rows["strategy"] == other].set_index(["number", "pairs"])[figure]
+    return rows[figure] - of_other.reindex(pd.MultiIndex.from_frame(rows[["number", "pairs"]])).to_numpy()
+
+
+def _at_stopping(rows: pd.DataFrame) -> pd.DataFrame:
+    """Pairs and F1 where the default's stopping rule fires, or at the last pair, and both less with nothing given.
+
+    Args:
+        rows: one a session.
+    """
+    own = rows[rows["strategy"].str.startswith(NOTHING)]
+    own = own.assign(more_pairs=_more_than(own, NOTHING, "stop_pairs"), gain=_more_than(own, NOTHING, "stop_f1"))
+    names = ("stop_pairs", "more_pairs", "stop_f1", "gain")
+    return pd.DataFrame(
+        [
+            {
+                "strategy": strategy,
+                "sessions": len(part),
+                "stopped": part["stopped"].mean(),
+                **_with_errors(part, names),
+            }
+            for strategy, part in own.groupby("strategy")
+        ]
+    )
+
+
+def _with_errors(rows: pd.DataFrame, names: Sequence[str]) -> dict[str, float]:
+    error = partial(error_by_person, persons=rows["person"])
+    return {f"{name}{end}": of(rows[name]) for name in names for end, of in (("", pd.Series.mean), ("_se", error))}
+
+
 def _of_default(rows: pd.DataFrame, by: str) -> pd.core.groupby.DataFrameGroupBy:
-    return rows[rows["strategy"].str.startswith("default")].groupby(["strategy", "pairs", by])
+    return rows[rows["strategy"].str.startswith(NOTHING)].groupby(["strategy", "pairs", by])
 
 
 def _by_pairs(strategy: str, pairs: int, rows: pd.DataFrame) -> dict[str, object]:
-    error = partial(error_by_person, persons=rows["person"])
-    names = ("f1", "expected_f1", "behind_the_law", "start_covered", "end_covered", "sure_and_wrong")
-    figures = {f"{name}{end}": of(rows[name]) for name in names for end, of in (("", pd.Series.mean), ("_se", error))}
+    names = ("f1", "gain", "expected_f1", "behind_the_law", "start_covered", "end_covered", "sure_and_wrong")
     by_person = rows.groupby("person")[["f1", "too_sure"]].mean()
     worst = {
         "worst_person": int(by_person["f1"].idxmin()),
         "worst_f1": by_person["f1"].min(),
         "most_too_sure": by_person["too_sure"].max(),
     }
-    return {"strategy": strategy, "pairs": pairs, "sessions": len(rows), **figures, **worst}
+    return {"strategy": strategy, "pairs": pairs, "sessions": len(rows), **_with_errors(rows, names), **worst}
 
 
 def _by_person(strategy: str, pairs: int, person: int, rows: pd.DataFrame) -> dict[str, object]:
-    names = ["f1", "f1_se", "expected_f1", "behind_the_law", "sure_and_wrong"]
-    figures = rows[["f1", "expected_f1", "behind_the_law", "sure_and_wrong"]].mean().to_dict()
-    figures["f1_se"] = rows["f1"].sem()
-    return {"strategy": strategy, "pairs": pairs, "person": person, **{name: figures[name] for name in names}}
+    figures = rows[["f1", "expected_f1", "too_sure", "behind_the_law", "sure_and_wrong"]].mean().to_dict()
+    errors = {f"{name}_se": rows[name].sem() for name in ("f1", "too_sure")}
+    return {"strategy": strategy, "pairs": pairs, "person": person, **figures, **errors}
 
 
 def _believed(strategy: str, pairs: int, wrong: float, rows: pd.DataFrame) -> dict[str, object]:
@@ -100,7 +132,7 @@ def _believed(strategy: str, pairs: int, wrong: float, rows: pd.DataFrame) -> di
 
 def _without_any(rows: pd.DataFrame, people: Sequence[RecordedPerson], space: DesignSpace) -> pd.DataFrame:
     """F1 of the default before any pair, and of the best fixed window, which is chosen on all other persons."""
-    start = rows[(rows["pairs"] == 0) & rows["strategy"].str.startswith("default")]
+    start = rows[(rows["pairs"] == 0) & rows["strategy"].str.startswith(NOTHING)]
     found = [(strategy, part["f1"], part["person"]) for strategy, part in start.groupby("strategy")]
     persons = pd.Series([each.bank.person for each in people])
     truths = [each.subject().window(space) for each in people]

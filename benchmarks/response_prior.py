@@ -4,8 +4,9 @@
 
 Six numbers are free beside the default's prior: four shares (the fifth follows), and median and SD of where half of the
 largest MEP of a hand muscle lies. They have the largest likelihood of all banks, with today's shares counted as much as
-one person. What is said of a person comes from a fit without them; errors are by bootstrap over persons. The default's
-prior is not changed. The recordings lie elsewhere: `--data`, or the variable ISIW_SHARED_DATA, names their folder.
+three of them. A bank is one recruitment curve, with `--banks coils` both of a coil. What is said of a person comes from
+a fit without them; errors are by bootstrap over persons. The default's prior is not changed. The recordings lie
+elsewhere: `--data`, or the variable ISIW_SHARED_DATA, names their folder.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, cast
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,7 @@ from scipy.special import logsumexp
 
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
-from benchmarks.recorded_people import Bank, banks, recordings
+from benchmarks.recorded_people import Bank, Banks, banks, recordings
 from benchmarks.response_evidence import Draws, all_drawn, mixtures
 from benchmarks.response_laws import NAMES
 from benchmarks.tables import write_tables
@@ -37,8 +38,8 @@ SDS: Final = np.arange(2.0, 10.1, 1.0)
 GRID: Final = np.array([(median, sd) for median in MEDIANS for sd in SDS])
 TODAY: Final = (HAND.rest_pct.median, HAND.rest_pct.sd)
 
-AS_ONE_PERSON: Final = 3.0
-"""Today's shares count as so many banks, those of one person, so that kinds without support keep a small share."""
+AS_BANKS: Final = 3.0
+"""Today's shares count as so many banks, a person's coils, so that kinds without support keep a small share."""
 ITERATIONS = 60
 
 
@@ -104,7 +105,7 @@ class Evidence:
 
 
 def fitted(by_kind: FloatArray) -> Fit:
-    """The six numbers of the largest likelihood, today's shares counted as one person.
+    """The six numbers of the largest likelihood, today's shares counted as `AS_BANKS`.
 
     Args:
         by_kind: log density of each bank, shape (grid, banks, kinds).
@@ -114,8 +115,8 @@ def fitted(by_kind: FloatArray) -> Fit:
     for _ in range(ITERATIONS):
         joint = by_kind + np.log(shares)[:, None]
         of_kind = np.exp(joint - logsumexp(joint, axis=-1, keepdims=True))
-        shares = (of_kind.sum(1) + AS_ONE_PERSON * today) / (by_kind.shape[1] + AS_ONE_PERSON)
-    score = logsumexp(by_kind + np.log(shares)[:, None], axis=-1).sum(1) + AS_ONE_PERSON * np.log(shares) @ today
+        shares = (of_kind.sum(1) + AS_BANKS * today) / (by_kind.shape[1] + AS_BANKS)
+    score = logsumexp(by_kind + np.log(shares)[:, None], axis=-1).sum(1) + AS_BANKS * np.log(shares) @ today
     best = int(score.argmax())
     return Fit(tuple(shares[best].tolist()), tuple(GRID[best].tolist()))
 
@@ -184,6 +185,7 @@ def main(
     seed: Annotated[int, typer.Option(help="Seed of draws and bootstrap.")] = 1,
     bootstraps: Annotated[int, typer.Option(help="How often persons are resampled.")] = 200,
     most: Annotated[int | None, typer.Option(help="Use so many banks only, for a quick look.")] = None,
+    kind: Annotated[str, typer.Option("--banks", help="What a bank is: curves or coils.")] = "curves",
     data: Annotated[Path | None, typer.Option(help="Folder of the recordings.")] = None,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("response_prior"),
 ) -> None:
@@ -192,7 +194,7 @@ def main(
     if not data.is_dir():
         print(f"Skipped: the recordings are not at hand, {data} is no folder. Name it with --data.")
         return
-    evidence = evidence_of(banks(data)[:most], seed)
+    evidence = evidence_of(banks(data, cast("Banks", kind))[:most], seed)
     fit, folds = fitted(evidence.by_kind), folds_of(evidence)
     rng = np.random.default_rng(seed)
     draws = [fitted(evidence.resampled(rng)) for _ in range(bootstraps)]

@@ -38,7 +38,7 @@ def test_a_wrong_curve_is_another_level_scale_place_or_muscle() -> None:
 
 
 def test_another_muscle_has_another_curve_and_the_same_window() -> None:
-    ((own, other),) = examined(1, 5, recorded=False)
+    ((own, other),) = examined(1, 5)
     assert own.subject.window(isiw.VALVE_SPACE) is not None
     assert own.pulse(130.0, 0) != other.pulse(130.0, 0)
     assert own.pulse(130.0, 0) == own.pulse(130.0, 0)
@@ -47,7 +47,7 @@ def test_another_muscle_has_another_curve_and_the_same_window() -> None:
 
 def test_of_recorded_people_the_other_muscle_is_the_next_persons(shared_data: Path) -> None:
     del shared_data
-    people = examined(11, 5, recorded=True)
+    people = examined(11, 5, "curves")
     assert [(own.whose, other.whose) for own, other in people][8:] == [(9, 10), (10, 1), (1, 2)]
     assert list(people[0][0].over_pct_rmt(7)) != sorted(people[0][0].over_pct_rmt(7))
 
