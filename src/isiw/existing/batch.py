@@ -79,8 +79,8 @@ def read_files(
     people = [one._replace(refused=_spelt_otherwise(code, codes) if times[spelling(code)] > 1 else None)
               for one in everybody if only in {None, code := one.delivered.subject}]  # fmt: skip
     if only is not None and not people:
-        codes = codes_of([one.delivered for one in everybody])
-        raise InvalidValueError("no person has this code", got=only, expected=codes)
+        there = codes_of([one.delivered for one in everybody])
+        raise InvalidValueError("no person has this code", got=only, expected=there)
     found = _placed(people, output)
     for person in found:
         if person.log is not None and person.refused is None and log_exists(person.log) and not is_there(person):
