@@ -3,7 +3,8 @@
     python -m benchmarks.recorded_cohort --people 400 --seed 10000 --given 0 --out benchmarks/results/recorded_cohort
 
 The recordings lie in no repository of ours: `--data`, or the variable ISIW_SHARED_DATA, names their folder. `--given
-0,10,30,60,600` gives the default so many single pulses of the same law first; `--fitted` adds the default with the
+0,10,30,60,600` gives the default so many single pulses of the same law first, and has one who takes the law from these
+and knows all else but start and width; `--fitted` adds the default with the
 prior that `benchmarks.response_prior` fitted to all other persons. `--banks coils` draws from both curves of a coil,
 trials from every second pulse and what is known from the other half. `--made-up 10` puts hands of the default's own law
 in the place of who was recorded, so many pulses a level. Sessions are kept beside the result as they finish,
@@ -18,7 +19,7 @@ import re
 import warnings
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, cast
 
@@ -31,7 +32,7 @@ import isiw
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.recorded_law import KnowsTheLaw
-from benchmarks.recorded_people import Banks, RecordedPerson, recordings
+from benchmarks.recorded_people import Banks, RecordedPerson, RecordedResponse, recordings
 from benchmarks.recorded_tables import tables_of
 from benchmarks.response_prior import Fit, read_folds
 from benchmarks.tables import kept, write_tables
@@ -68,13 +69,19 @@ class RecordedSession:
     @property
     def label(self) -> str:
         """What its rows are called."""
+        if self.strategy == LAW and self.given:
+            return f"who takes the law from {self.given} single pulses"
         return f"{self.strategy}, {self.given} single pulses first" if self.given else self.strategy
 
     def player(self) -> Any:
         """What asks, learns and reports, before the first pair."""
         if self.strategy in {LAW, TOO_GOOD}:
             half = "other" if self.strategy == LAW else "drawn"
-            return KnowsTheLaw(self.person.subject(half), SPACE)
+            subject = self.person.subject(half)
+            if self.given:
+                own = cast("RecordedResponse", subject.response)
+                subject = replace(subject, response=replace(own, bank=self.person.bank_of_pulses(self.given)))
+            return KnowsTheLaw(subject, SPACE)
         subject = self.person.subject()
         seed = self.person.seed + self.person.number
         prior = {} if self.fit is None else {"prior": self.fit.prior()}
@@ -139,7 +146,7 @@ class Chunk:
 def chunks(
     people: list[RecordedPerson], given: list[int], trials: int, folder: Path, folds: Mapping[int, Fit] | None = None
 ) -> list[Chunk]:
-    """All sessions: the default with so many pulses first, with fitted priors, and who knows the law.
+    """All sessions: the default with so many pulses first, with fitted priors, and who knows the law, also from them.
 
     Where banks are split in halves there is also who knows the half that trials are drawn from.
 
@@ -150,7 +157,7 @@ def chunks(
         folder: where rows are kept.
         folds: the fit without each person; None for no fitted priors.
     """
-    plan = [("default", count) for count in given] + [(LAW, 0)]
+    plan = [("default", count) for count in given] + [(LAW, count) for count in sorted({0, *given})]
     if people[0].bank.kernel_log_sds is None:
         plan.append((TOO_GOOD, 0))
     plan += [(FITTED, count) for count in given if folds]

@@ -259,3 +259,14 @@ class RecordedPerson:
             places = rng.permutation(len(half.levels_pct_rmt)).tolist()
             pulses += [(float(half.levels_pct_rmt[place]), half.drawn_mv(place, rng)) for place in places]
         return pulses[:count]
+
+    def bank_of_pulses(self, count: int) -> Bank:
+        """Single pulses given first as a bank: the amplitudes by level, and no law.
+
+        Args:
+            count: how many; every level had one at least.
+        """
+        pulses = self.single_pulses(count)
+        levels = self.bank.levels_pct_rmt
+        by_level = tuple(np.array([mep_mv for at, mep_mv in pulses if at == level]) for level in levels.tolist())
+        return replace(self.bank, amplitudes_mv=by_level, kernel_log_sds=None)
