@@ -74,9 +74,9 @@ def read_files(
 ) -> list[Person]:
     """The people of some files, and where their logs go: one log (.mcap), or a folder for a log of each."""
     everybody = [person for source in sources for person in _read(Path(source), way)]
-    codes = dict.fromkeys(one.delivered.subject for one in everybody)
-    times = Counter(map(spelling, codes))
-    people = [one._replace(refused=_spelt_otherwise(code, codes) if times[spelling(code)] > 1 else None)
+    every_code = dict.fromkeys(one.delivered.subject for one in everybody)
+    times = Counter(map(spelling, every_code))
+    people = [one._replace(refused=_spelt_otherwise(code, every_code) if times[spelling(code)] > 1 else None)
               for one in everybody if only in {None, code := one.delivered.subject}]  # fmt: skip
     if only is not None and not people:
         there = codes_of([one.delivered for one in everybody])

@@ -102,7 +102,7 @@ class Column:
         if is_missing(cell):
             return None
         word = str(cell).strip().casefold()
-        says = [word in WORDS[usual] | WORDS[kind] for usual, kind in (("yes", yes), ("no", no))]
+        says = [word in WORDS[usual] or word in WORDS[kind] for usual, kind in (("yes", yes), ("no", no))]
         if not any(says):
             raise self.refused(row, "says neither yes nor no", "Use accepted and rejected, or 1 and 0.")
         return says[0]
