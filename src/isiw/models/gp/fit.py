@@ -22,7 +22,7 @@ from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.lazy import botorch, scipy, torch
 from isiw.models.gp.places import Hyperparameters, Places, Tensor
 from isiw.models.gp.prior import ProcessSettings, Standardisation, correlations, regression
-from isiw.models.gp.weights import Weights, features, functions
+from isiw.models.gp.weights import TINY, Weights, features, functions
 from isiw.models.shared.history import PersonTrials
 from isiw.types import FloatArray
 
@@ -44,7 +44,6 @@ LEAST_SQUARE = 1e-3
 NEWTON_STEPS = 12
 MAX_STEP = 2.0
 ROUNDS = 3
-TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
