@@ -72,6 +72,7 @@ def run(
     people: Annotated[int, typer.Option(help="People a cohort.")] = 1000,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 100_000,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+    trials: Annotated[int, typer.Option(help="Trials a session.")] = 40,
     to_stopping: Annotated[int | None, typer.Option(help="So many trials, and where the rule ends.")] = None,
     *,
     earlier_prior: Annotated[bool, typer.Option(help="With the prior of 1bbe107 in this version.")] = False,
@@ -80,9 +81,8 @@ def run(
     """Run the default of the isiw that is imported."""
     torch.set_num_threads(1)
     for name in cohorts.split(","):
-        marks, stopping = MARKS, "ignored"
-        if to_stopping is not None:
-            marks, stopping = tuple(sorted({*(m for m in (*MARKS, *LATER) if m <= to_stopping), to_stopping})), "noted"
+        last, stopping = (trials, "ignored") if to_stopping is None else (to_stopping, "noted")
+        marks = tuple(sorted({*(mark for mark in (*MARKS, *LATER) if mark <= last), last}))
         study = study_of(name, people, seed, marks, stopping, settings=prior_of_1bbe107() if earlier_prior else None)
         results = conduct(study, out / f"{name}.study", executor=Processes(workers))
         results.rows().to_parquet(out / f"{name}.parquet")
