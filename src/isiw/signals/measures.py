@@ -75,7 +75,11 @@ def _end_ms(emg_mv: FloatArray, since_ms: FloatArray, onset_ms: float) -> float:
 
 
 def _silent_ms(emg_mv: FloatArray, since_ms: FloatArray, rate_hz: float, end_ms: float | None) -> float:
-    """Until when after the pulse a contracted muscle is silent [ms], by the first stretch whose SD is back, or NaN."""
+    """Until when after the pulse a contracted muscle is silent [ms], or NaN.
+
+    In the first stretch whose SD is that of before, it is the first sample that is as far off: EMG that comes back
+    stronger fills a part of the stretch only.
+    """
     length = samples(MOVING_MS, rate_hz)
     if end_ms is None or length < 2 or emg_mv.size < length:
         return math.nan
@@ -87,4 +91,7 @@ def _silent_ms(emg_mv: FloatArray, since_ms: FloatArray, rate_hz: float, end_ms:
     after = np.flatnonzero(starts_ms >= end_ms)
     quiet = after[sds[after] < sds[before].mean()]
     back = after[(after > quiet[0]) & (sds[after] >= sds[before].mean())] if quiet.size else quiet
-    return float(starts_ms[back[0]]) if back.size else math.nan
+    if not back.size:
+        return math.nan
+    stretch = emg_mv[back[0] : back[0] + length]
+    return float(since_ms[back[0] + (np.abs(stretch - stretch.mean()) >= sds[before].mean()).argmax()])
