@@ -39,6 +39,7 @@ def people(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("read_here")
 def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice(isiw: Command, people: Path) -> None:
     words = ("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
     first = isiw(*words)
