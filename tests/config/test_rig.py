@@ -148,6 +148,7 @@ def with_real_device(template: Path) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("few_sweeps")
 def test_a_session_starts_from_the_same_persons_earlier_ones_alone(template: Path, tmp_path: Path) -> None:
     own, others = (
         write_log(tmp_path / f"{subject}.mcap", subject=subject, trials=3, space=IMPACT_SPACE)

@@ -260,7 +260,8 @@ def test_a_log_of_other_software_has_no_configuration(tmp_path: Path, config: di
 def test_every_limit_of_a_configuration_is_the_sessions(tmp_path: Path) -> None:
     wanted = {"min_iti_s": 6, "max_pulses": 30, "max_block_pulses": 12, "rest_s": 90.0, "max_period_pulses": 40}
     file = tmp_path / "session.toml"
-    file.write_text(tomli_w.dumps({"log": str(tmp_path / "s.mcap"), "limits": wanted}))
+    short = {"settings": {"max_trials": 3}}
+    file.write_text(tomli_w.dumps({"log": str(tmp_path / "s.mcap"), "limits": wanted, "strategy": short}))
     session_for(load_config(file).with_overrides(strategy="random")).run()
     kept = read_session(tmp_path / "s.mcap").header.limits
     assert {name: getattr(kept, name) for name in wanted} == wanted

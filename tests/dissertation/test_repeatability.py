@@ -69,8 +69,10 @@ def test_the_presets_reproduce_the_event_table_by_detection_on_their_waveforms(n
         assert table.loc[event, "n"] == taps, event
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
+SEEDS = [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.long)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_the_gaussian_preset_has_the_pooled_isi_error_and_no_mistrials(seed: int) -> None:
     study = study_preset("cushion", seed=seed)
     assert len(study.commanded_ms) == 900
@@ -79,8 +81,7 @@ def test_the_gaussian_preset_has_the_pooled_isi_error_and_no_mistrials(seed: int
     assert study.mistrials == 0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", SEEDS)
 def test_the_timing_fault_preset_has_negative_isis_at_10_ms_only(seed: int) -> None:
     table = study_preset("timing-fault", seed=seed).error_table
     assert table["mistrials"].loc[10.0] == pytest.approx(8, abs=5)

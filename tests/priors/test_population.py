@@ -91,6 +91,9 @@ def shares_after_nothing(seed: int) -> FloatArray:
 
 
 @pytest.mark.slow
-def test_people_of_whom_nothing_is_known_teach_nothing() -> None:
+def test_people_of_whom_nothing_is_known_teach_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Seeds differ by .11 (SD) with so few, and their mean lies within .004.
+    monkeypatch.setattr("isiw.priors.population.SWEEPS", 400)
+    monkeypatch.setattr("isiw.priors.population.BURN_IN", 100)
     found = [shares_after_nothing(seed) for seed in range(12)]
     assert np.mean(found, axis=0) == pytest.approx(KINDS, abs=0.06)

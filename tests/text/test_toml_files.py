@@ -61,13 +61,16 @@ def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path: Path) -> None:
         read_toml(tmp_path / "nowhere.toml")
 
 
+PARTS = ".".join(f"k{part}" for part in range(97))
+
+
 @pytest.mark.parametrize(
     "text",
     [
         "x = 0x" + "f" * 5000,
         "x = " + "9" * 5000,
         "[a]\ny = [1, 0b1" + "0" * 300 + "]",
-        "".join(f"[a{n}.{'.'.join(f'k{part}' for part in range(97))}]\n" for n in range(20_000)),
+        "".join(f"[a{n}.{PARTS}]\n" for n in range(20_000)),
         ".".join(f'"k {part}"' for part in range(20_000)) + " = 1",
         ".".join("k" * 50 for _ in range(200)) + " = 1",
         "x = " + "[" * 5000,

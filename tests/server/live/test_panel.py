@@ -43,7 +43,7 @@ FIXED: Final = (
     "#intensity",
     "#next",
 )
-SEQUENCES: Final = int(os.environ.get("ISIW_BROWSER_SEQUENCES", "12"))
+SEQUENCES: Final = int(os.environ.get("ISIW_BROWSER_SEQUENCES", "6"))
 """How many sequences of presses are drawn in the browser; three hundred take some minutes."""
 
 
