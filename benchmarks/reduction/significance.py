@@ -8,11 +8,10 @@ from typing import Final
 import numpy as np
 import pandas as pd
 from scipy.stats import ttest_rel
+from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.power import TTestPower
 
-from isiw.types import FloatArray
-
-__all__ = ["holm", "no_power", "paired_tests", "stars"]
+__all__ = ["no_power", "paired_tests", "stars"]
 
 FEWEST: Final = 3
 """People of whom a spread is known."""
@@ -38,16 +37,8 @@ def paired_tests(values: pd.DataFrame, pairs: list[tuple[str, str]] | None = Non
     table = pd.DataFrame(rows, columns=["first", "second", "difference", "people", "p"])
     if table.empty:
         return table.assign(stars=[])
-    table["p"] = holm(table["p"].to_numpy())
+    table["p"] = multipletests(table["p"], method="holm")[1]
     return table.assign(stars=[stars(p) for p in table["p"]])
-
-
-def holm(p: FloatArray) -> FloatArray:
-    """p-values, corrected by Holm's method for their number; statsmodels' looks for garbage each time."""
-    order = np.argsort(p)
-    corrected = np.empty_like(p)
-    corrected[order] = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))
-    return np.minimum(corrected, 1.0)
 
 
 POWER: Final = 0.8
