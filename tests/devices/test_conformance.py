@@ -115,6 +115,25 @@ def test_the_suite_finds_a_device_that_fires_unarmed(space: DesignSpace) -> None
         check_device(Careless, space)
 
 
+class Plain(Careless):
+    """Refuses with an error of its own."""
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:
+        raise RuntimeError(f"not armed: {stimulus}, {timeout_s}")
+
+
+def test_the_suite_says_how_a_device_refuses_that_raises_an_error_of_its_own(space: DesignSpace) -> None:
+    expected = r"deliver raises a DeviceError before stage\(\); found: RuntimeError: not armed"
+    with pytest.raises(AssertionError, match=expected):
+        check_device(Plain, space)
+
+
+def test_the_suite_makes_the_device_itself(space: DesignSpace) -> None:
+    device: Any = Careless()
+    with pytest.raises(InvalidValueError, match="makes the device itself"):
+        check_device(device, space)
+
+
 def test_the_suite_finds_a_device_that_cannot_resume(space: DesignSpace) -> None:
     with pytest.raises(AssertionError, match="never been interrupted"):
         check_device(lambda: Forgetful(SimulatedPerson(responder(), "valve")), space)

@@ -38,6 +38,15 @@ def test_an_intensity_in_parts_of_one_or_one_that_contradicts_the_strategys_begi
     assert (device.delivered, list(log.parent.iterdir())) == ([], [])
 
 
+@pytest.mark.parametrize(
+    ("device", "words"), [(ScriptedDevice, r"Make one: ScriptedDevice\(\)"), (object(), "has describe, stage")]
+)
+def test_what_is_no_device_begins_nothing_and_is_told_what_one_has(log: Path, device: Any, words: str) -> None:
+    with pytest.raises(InvalidValueError, match=f"cannot use this device.*{words}"):
+        Session(device, scripted_strategy(), log=log)
+    assert list(log.parent.iterdir()) == []
+
+
 def test_a_session_that_was_never_armed_promises_no_log(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     device, free = ScriptedDevice(), threading.Event()
     monkeypatch.setattr(device, "stage", lambda: free.wait(9.0))

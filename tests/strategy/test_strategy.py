@@ -260,6 +260,13 @@ def test_what_is_no_acquisition_function_is_told_with_the_way_out(acquisition: A
         Strategy(usual.space, usual.model, acquisition, usual.stopping)
 
 
+def test_the_class_of_a_model_is_none() -> None:
+    usual = scripted_strategy()
+    kind: Any = type(usual.model)
+    with pytest.raises(StrategyError, match=rf"model is needed, and not its class.*Make one: {kind.__name__}\(\)"):
+        Strategy(usual.space, kind, usual.acquisition, usual.stopping)
+
+
 @pytest.mark.parametrize("seed", [-1, 1.5])
 def test_a_seed_is_a_whole_number_also_of_a_strategy_of_ones_own(seed: Any) -> None:
     usual = scripted_strategy()

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+import isiw
 from isiw.studies import conduct
 from isiw.studies.plan import study_from
 
@@ -58,6 +59,9 @@ def test_people_of_ones_own_meet_named_strategies(capsys: pytest.CaptureFixture[
     assert len(names["rows"]) == 2 * 2 * 2
     assert set(names["rows"]["cohort"]) == {"mine"}
     assert "random" in capsys.readouterr().out
+    exec(compile(blocks("python")[5], "studies.md", "exec", dont_inherit=True), names)  # noqa: S102 - as above
+    assert names["noisy"].window(isiw.VALVE_SPACE) is not None
+    assert "mep_mv=" in capsys.readouterr().out
 
 
 def test_the_true_edges_of_a_person_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,7 +72,7 @@ def test_the_true_edges_of_a_person_are_shown(capsys: pytest.CaptureFixture[str]
 @pytest.mark.slow
 def test_a_model_is_shown_to_be_calibrated(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {"__name__": "docs"}
-    exec(compile(blocks("python")[5], "studies.md", "exec"), names)  # noqa: S102 - as above
+    exec(compile(blocks("python")[6], "studies.md", "exec"), names)  # noqa: S102 - as above
     assert len(names["ranks"]) > 5
     assert all(0 <= rank <= 1 for ranks in names["ranks"] for rank in ranks)
     capsys.readouterr()
@@ -81,7 +85,7 @@ def test_rows_of_several_folders_are_put_together(
     for folder, name in (("a.study", "nr"), ("b.study", "pf")):
         conduct(study_from({"strategies": [name], "cohorts": ["gaussian"], "people": 2, "trials": 2}, "docs"), folder)
     names: dict[str, Any] = {"__name__": "docs"}
-    exec(compile(blocks("python")[7], "studies.md", "exec"), names)  # noqa: S102 - as above
+    exec(compile(blocks("python")[8], "studies.md", "exec"), names)  # noqa: S102 - as above
     assert names["differences"](names["rows"])["people"].tolist() == [2]
     assert "pf" in capsys.readouterr().out
 

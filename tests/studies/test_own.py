@@ -135,6 +135,8 @@ def test_a_study_of_ones_own_code_is_continued_by_the_file_that_names_it(tmp_pat
     with pytest.raises(StudyError, match="does not name"):
         conduct(open_store(folder).study, folder)
     assert len(conduct(load_study(plan), folder).rows()) == 4
+    finished = CliRunner().invoke(app, ["study", "run", str(folder)])  # nothing is left, so no code is needed
+    assert (finished.exit_code, "Nothing is left to run." in finished.output) == (0, True), finished.output
 
 
 def test_rows_of_changed_code_do_not_join_those_that_are_there(tmp_path: Path, module: str) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from isiw.acquisition.information import MutualInformation
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import ACQUISITIONS
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
-from isiw.errors import StrategyError
+from isiw.errors import InvalidValueError, StrategyError
 from isiw.estimate import WindowEstimate
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.protocol import Observation, Posterior, ProposesIsi
@@ -164,6 +164,10 @@ def undecided(_posterior: object, isi_ms: Array) -> Array:
     return np.full((1, len(isi_ms)), math.nan)
 
 
+def of_each_sample(posterior: Any, isi_ms: Array) -> Any:
+    return posterior.window_masks(isi_ms)[0]
+
+
 def moody(_posterior: object, isi_ms: Array) -> Array:
     return np.random.default_rng().random((1, len(isi_ms)))
 
@@ -187,6 +191,8 @@ class Scoring:
     ("acquisition", "promise"),
     [
         (Scoring(flat), "shape"),
+        (Scoring(of_each_sample), "for 1 ISI of 1 person"),
+        (cast("Any", Scoring), "is no class"),
         (Scoring(undecided), "finite"),
         (Scoring(moody), "same scores"),
         (Scoring(listed), "NumPy array"),
@@ -197,6 +203,16 @@ class Scoring:
 def test_the_suite_finds_a_broken_acquisition_function(acquisition: AcquisitionFunction, promise: str) -> None:
     with pytest.raises(AssertionError, match=promise):
         check_acquisition(acquisition, particles_after(()), VALVE_SPACE)
+
+
+def test_a_suite_that_is_given_what_it_makes_itself_says_so() -> None:
+    strategy = make_strategy("even", **FEW)
+    with pytest.raises(
+        InvalidValueError, match=r"(?s)makes the strategy itself; got .*; expected its class, or a function"
+    ):
+        check_strategy(cast("Any", strategy))
+    with pytest.raises(InvalidValueError, match="makes the model itself"):
+        check_model(cast("Any", strategy.model), VALVE_SPACE)
 
 
 class Forgetful(Strategy):

@@ -66,12 +66,16 @@ def require_capabilities(acquisition: AcquisitionFunction, model: object, poster
         )
 
 
+def require_made(given: object, what: str) -> None:
+    """Raise if a class is given for an object of it."""
+    if isinstance(given, type):
+        remedy = f"Make one: {given.__name__}()."
+        raise StrategyError(f"{what} is needed, and not its class", got=given, remedy=remedy)
+
+
 def require_acquisition(given: object) -> None:
     """Raise if something else is given for an acquisition function."""
-    if isinstance(given, type):
-        raise StrategyError(
-            "an acquisition function is needed, and not its class", got=given, remedy=f"Make one: {given.__name__}()."
-        )
+    require_made(given, "an acquisition function")
     if not (isinstance(given, AcquisitionFunction) and isinstance(given.needs, Iterable)):
         raise StrategyError(
             "it cannot be an acquisition function",

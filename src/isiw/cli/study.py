@@ -160,7 +160,8 @@ def run(
         again = ("study", "run", source, "--out", folder) if source.is_file() else ("study", "run", folder)
         kept = f"Interrupted. All that is finished is kept; continue with: {command(*again)}"
         with errors_reported(kept), _bar(left) as on_done:
-            studies.conduct(store.study, folder, executor, retry=retry, on_done=on_done)
+            if left:
+                studies.conduct(store.study, folder, executor, retry=retry, on_done=on_done)
         _say_what_is_there(store)
         if len(store.errors()):
             raise typer.Exit(1)

@@ -15,6 +15,9 @@ from isiw.trials import Stimulus
 Answer: TypeAlias = Sweep | Measurement
 """What came of a stimulus: waveforms, or the MEP as the device measured it."""
 
+VERBS: Final = ("describe", "stage", "deliver", "stop", "unstage")
+"""The methods of a device."""
+
 
 @runtime_checkable
 class Device(Protocol):

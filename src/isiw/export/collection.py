@@ -226,7 +226,8 @@ def read_logs(source: str | Path, channels: Iterable[str] | None = None) -> tupl
             continue
         first = records.setdefault(hash_of(file), record)
         if first is not record:
-            left_out.append(f"{file.name} is left out: it is a copy of {first.path.name}.")
+            copy, kept_log = (each.relative_to(source) for each in (file, first.path))
+            left_out.append(f"{copy} is left out: it is a copy of {kept_log}.")
     if not records:
         what = "no log in the folder can be read" if left_out else "there is no log in the folder"
         raise LogError(what, got=str(source), expected="files called .mcap or .mcap.part")

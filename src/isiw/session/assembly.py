@@ -16,7 +16,7 @@ from isiw import schedule
 from isiw.checks import code, deadline, patience
 from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
-from isiw.devices.protocol import Device
+from isiw.devices.protocol import VERBS, Device
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.intervention import Intervention
 from isiw.log.headers import FirstStep, Header, StrategyRecipe
@@ -74,9 +74,10 @@ def require_parts(log: object, options: Mapping[str, Any] = MappingProxyType({})
     """The log's path; raise where a part of a session is something else than it should be."""
     stated = {name: (options[name], kind) for name, kind in _OPTIONAL_PARTS.items() if options.get(name) is not None}
     for name, (part, kind) in (parts | stated).items():
-        if not isinstance(part, kind):
-            expected = f"an isiw.{kind.__name__}"
-            raise InvalidValueError(f"a session cannot use this {name}", got=part, expected=expected)
+        if isinstance(part, type) or not isinstance(part, kind):
+            expected = f"an isiw.{kind.__name__}" + (f", which has {', '.join(VERBS)}" if kind is Device else "")
+            remedy = f"Make one: {part.__name__}()." if isinstance(part, type) else None
+            raise InvalidValueError(f"a session cannot use this {name}", got=part, expected=expected, remedy=remedy)
     if not isinstance(log, str | os.PathLike):
         raise InvalidValueError("a session needs a log", got=log, expected='a path, such as "P07.mcap"')
     return log_of(Path(log))

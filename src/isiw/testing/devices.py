@@ -16,7 +16,7 @@ from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import PunctualDevice
 from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DiesArmed, HasMemory, Readiness, readiness_of
+from isiw.devices.protocol import VERBS, Answer, Device, DiesArmed, HasMemory, Readiness, readiness_of
 from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, NotDelivered, StillArmedError, error_text
 from isiw.findings import Kind
 from isiw.log.schema import waveform_topic
@@ -38,12 +38,11 @@ from isiw.testing.device_table import (
     late_deflection,
     wrong_hit_delay,
 )
-from isiw.testing.suites import broken, require
+from isiw.testing.suites import broken, require, require_maker
 from isiw.text.sanitize import shown
 from isiw.trials import Stimulus, Trial
 
 _DISARMED_S: Final = 2.0
-_VERBS: Final = ("describe", "stage", "deliver", "stop", "unstage")
 
 
 def check_device(
@@ -79,7 +78,7 @@ def check_device(
             or the artefact of its pulse at another time than it reports; the message says which, and why.
         DeviceError: the device failed, is not ready, or is driven by a session.
         LimitExceededError: the limits do not allow a stimulus; it was not delivered.
-        InvalidValueError: an inter-trial interval that is negative or not finite.
+        InvalidValueError: an inter-trial interval that is negative or not finite, or no function that makes a device.
     """
     rules, least_s = _Rules(space, signals or SignalLimits()), number("iti_s", iti_s, least=0)
     pace = CheckPace(timeout_s, least_s, limits or Limits.of_space(space, min_iti_s=least_s), clock or MonotonicClock())
@@ -92,9 +91,10 @@ def _checked(
     make: Callable[[], Device], rules: _Rules, pace: CheckPace, say: Callable[[str], None], *, virtual: bool
 ) -> DeviceTable:
     """The table of a device; where `virtual`, a simulated one does not really wait."""
+    require_maker(make, "the device")
     device = make()
-    lacking = [verb for verb in _VERBS if not hasattr(device, verb)]
-    require(not lacking, f"a device has {', '.join(_VERBS)}", f"{shown(device)} without {', '.join(lacking)}")
+    lacking = [verb for verb in VERBS if not hasattr(device, verb)]
+    require(not lacking, f"a device has {', '.join(VERBS)}", f"{shown(device)} without {', '.join(lacking)}")
     _check_description(device, rules.space)
     if virtual and device.describe().simulated:
         pace = replace(pace, clock=VirtualClock())
@@ -325,6 +325,10 @@ class Guarded:
             self._tried(Stimulus(0, None))
         except DeviceError:
             return
+        except (AssertionError, IsiwError):  # it is too slow, or the limits do not allow it
+            raise
+        except Exception as error:
+            raise broken(f"deliver raises a DeviceError {when}", error_text(error)) from error
         raise broken(f"deliver raises a DeviceError {when}", "it delivered and raised nothing")
 
     def require_stop(self) -> None:

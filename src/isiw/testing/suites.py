@@ -27,7 +27,7 @@ from isiw.models.protocol import (
     SamplesWindows,
 )
 from isiw.strategy.strategy import Strategy
-from isiw.text.sanitize import shown
+from isiw.text.sanitize import counted, shown
 from isiw.trials import Trial
 from isiw.types import Singles
 
@@ -46,6 +46,21 @@ def require(condition: object, promise: str, seen: str = "") -> None:
 def broken(promise: str, seen: str) -> AssertionError:
     """That a promise is broken, as an error whose message sets what was found against what must hold."""
     return AssertionError(f"check failed. Required: {promise}{f'; found: {seen}' if seen else ''}")
+
+
+def require_maker(make: object, what: str) -> None:
+    """Raise if a suite is given something else than what makes the object that it tries."""
+    if not callable(make):
+        raise InvalidValueError(f"the check makes {what} itself", got=make, expected="its class, or a function")
+
+
+def people_of(posterior: Posterior, isi_ms: Singles) -> int | None:
+    """How many people a posterior is of, as far as what it can do says so."""
+    if isinstance(posterior, SamplesWindows):
+        return len(posterior.window_masks(isi_ms))
+    if isinstance(posterior, SamplesProfiles):
+        return len(posterior.profiles_mv(isi_ms))
+    return len(posterior.outcome_mass(isi_ms)) if isinstance(posterior, PredictsOutcomes) else None
 
 
 def usual_trials(space: DesignSpace) -> Trials:
@@ -113,7 +128,9 @@ def check_model(
 
     Raises:
         AssertionError: a promise is broken; the message says which.
+        InvalidValueError: no class or function that makes it.
     """
+    require_maker(make, "the model")
     model = make()
     require(isinstance(model, ResponseModel), "a model has begin() and update()")
     require(make() == model, "a model is settings: two made alike are equal")
@@ -251,7 +268,9 @@ def check_strategy(make: Callable[[], Strategy], *, trials: int = 12) -> None:
 
     Raises:
         AssertionError: a promise is broken; the message says which.
+        InvalidValueError: no class or function that makes it.
     """
+    require_maker(make, "the strategy")
     _check_asking(make())
     _check_refusals(make())
     for what, told in trials_that_break_things(make().space, trials).items():
@@ -340,6 +359,7 @@ def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, sp
     Raises:
         AssertionError: a promise is broken; the message says which.
     """
+    require(not isinstance(acquisition, type), "an acquisition function is no class", shown(acquisition))
     require(isinstance(acquisition, AcquisitionFunction), "an acquisition function is callable and says what it needs")
     missing = [c.__name__ for c in acquisition.needs if not isinstance(posterior, c)]
     require(not missing, "the posterior has what the acquisition function needs", f"not {', '.join(missing)}")
@@ -347,8 +367,10 @@ def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, sp
     for count in (1, 2, 23):
         isi_ms = np.linspace(space.low_ms, space.high_ms, count, dtype=np.float32)
         scores = _array("scores", acquisition(posterior, isi_ms))
-        shaped = scores.ndim == 2 and scores.shape[1] == count
-        require(shaped, "scores have the shape (b, t)", f"{scores.shape} for {count} ISIs")
+        people = people_of(posterior, isi_ms)
+        shaped = scores.ndim == 2 and scores.shape[1] == count and (people is None or len(scores) in (1, people))
+        of = "" if people is None else f" of {counted(people, 'person', 'people')}"
+        require(shaped, "scores have the shape (b, t)", f"{scores.shape} for {counted(count, 'ISI')}{of}")
         require(bool(np.isfinite(scores).all()), "scores are finite", str(scores.tolist()))
         require(np.array_equal(scores, acquisition(posterior, isi_ms)), "the same posterior gives the same scores")
     require(same_estimates(posterior.estimate(), before), "scoring leaves the posterior as it was")

@@ -19,7 +19,7 @@ from isiw.devices.dying import armed_by_another
 from isiw.devices.transports.line_table import Connection, LineExchange, LineHeartbeat, command_values, crc_of
 from isiw.devices.watchdog import Watchdog
 from isiw.errors import DeviceError, DeviceTimeoutError
-from isiw.text.sanitize import read_whole
+from isiw.text.sanitize import counted, read_whole
 
 _T = TypeVar("_T")
 
@@ -249,7 +249,7 @@ class _Others:
 
     def say(self, when: str) -> None:
         if self._count:
-            _log.warning("thrown away %s: %d lines, last %s", when, self._count, list(self.last))
+            _log.warning("thrown away %s: %s, last %s", when, counted(self._count, "line"), list(self.last))
 
 
 class _Lines:
