@@ -35,8 +35,7 @@ import isiw
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.metrics import covers, edge_ranks, f1
-from isiw.models.parametric import ParametricModel
-from isiw.models.protocol import Observation, Posterior, PriorPerson, ResponseModel
+from isiw.models.protocol import Observation, Posterior, PriorPerson
 from isiw.studies import paired_sessions, run_study
 
 SPACE = isiw.VALVE_SPACE
@@ -65,18 +64,12 @@ def replicate(batch: Batch) -> list[dict[str, float | None]]:
     people = [model.simulate(SPACE, seed, isi_ms) for seed, isi_ms in zip(seeds, isis_ms, strict=True)]
     meps_mv = np.stack([person.mep_mv for person in people])
     told = [_observation(*trial) for trial in zip(isis_ms.T, meps_mv.T, strict=True)]
-    return list(_judged(_after(model, model.begin(SPACE, batch.first_seed, batch.people), told), people, seeds))
+    begun = model.begin(SPACE, batch.first_seed, batch.people)
+    return list(_judged(functools.reduce(model.update, told, begun), people, seeds))
 
 
 def _observation(isi_ms: np.ndarray, mep_mv: np.ndarray) -> Observation:
     return Observation.of(isi_ms.tolist(), mep_mv.tolist())
-
-
-def _after(model: ResponseModel, posterior: Posterior, told: Sequence[Observation]) -> Posterior:
-    """What is believed after all trials; a model that fits anew each time is fitted once."""
-    if isinstance(model, ParametricModel):
-        return model.update_by_all(posterior, told)
-    return functools.reduce(model.update, told, posterior)
 
 
 def _judged(

@@ -1,6 +1,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ def observation(
 
 
 def after(model: ParametricModel, observations: Sequence[Observation], seed: int = 1) -> ParametricPosterior:
-    return model.update_by_all(model.begin(VALVE_SPACE, seed), observations)
+    return reduce(model.update, observations, model.begin(VALVE_SPACE, seed))
 
 
 def evenly(name: str, person: int, n: int) -> list[Observation]:
@@ -95,10 +96,10 @@ def test_the_parametric_model_conforms_with_every_likelihood(likelihood: Likelih
 
 def test_the_prior_is_sampled_as_it_is_stated() -> None:
     posterior = ParametricModel(samples=2000).begin(VALVE_SPACE, 1)
-    z = posterior.latents[0]
+    z = posterior.drawn.latents[0]
     assert z.mean(0).abs().max() < 0.12
     assert (z.std(0) - 1).abs().max() < 0.12
-    assert posterior.present.double().mean().item() == pytest.approx(WindowPrior().p_window, abs=0.01)
+    assert posterior.drawn.present.double().mean().item() == pytest.approx(WindowPrior().p_window, abs=0.01)
     assert posterior.log_evidence().item() == pytest.approx(0.0, abs=0.05)
 
 
@@ -115,7 +116,7 @@ def test_the_posterior_agrees_with_plain_importance_sampling_from_the_prior(like
     )
     assert torch.exp(2 * torch.logsumexp(with_, 0) - torch.logsumexp(2 * with_, 0)) > 500
     evidence = torch.stack([torch.logsumexp(x, 0) for x in (with_, without)]) + torch.tensor([0.75, 0.25]).log()
-    present = posterior.present[0]
+    present = posterior.drawn.present[0]
     assert present.double().mean().item() == pytest.approx(torch.softmax(evidence, 0)[0].item(), abs=0.03)
     assert posterior.log_evidence().item() == pytest.approx(
         (torch.logsumexp(evidence, 0) - math.log(len(z))).item(), abs=0.15
@@ -123,19 +124,28 @@ def test_the_posterior_agrees_with_plain_importance_sampling_from_the_prior(like
     weights = torch.softmax(with_, 0)
     mean = weights @ z
     sd = (weights @ (z - mean).square()).sqrt()
-    got = posterior.latents[0][present]
+    got = posterior.drawn.latents[0][present]
     assert ((got.mean(0) - mean) / sd).abs().max() < 0.25
     assert (got.std(0) / sd - 1).abs().max() < 0.25
 
 
 @pytest.mark.slow
-def test_trials_told_at_once_and_one_by_one_give_the_same_posterior() -> None:
+def test_who_looks_in_between_has_the_same_posterior() -> None:
     model = ParametricModel(likelihood="gamma")
     observations = evenly("gaussian", 2, 6)
-    step_by_step = model.begin(VALVE_SPACE, 1)
+    looked_at = model.begin(VALVE_SPACE, 1)
     for each in observations:
-        step_by_step = model.update(step_by_step, each)
-    assert torch.equal(step_by_step.latents, after(model, observations).latents)
+        looked_at = model.update(looked_at, each)
+        looked_at.estimate()
+    assert torch.equal(looked_at.drawn.latents, after(model, observations).drawn.latents)
+
+
+def test_nothing_is_drawn_before_somebody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("isiw.models.parametric.model.sample_person", None)
+    posterior = after(ParametricModel(), evenly("gaussian", 2, 6))
+    assert posterior.trials == 6
+    with pytest.raises(TypeError):
+        posterior.estimate()
 
 
 @pytest.mark.slow
@@ -145,7 +155,7 @@ def test_people_do_not_see_each_other() -> None:
     for isi_ms in (100.0, 250.0, 400.0):
         two = model.update(two, Observation.of([isi_ms] * 2, [0.01, 0.1]))
     alone = after(model, [observation(isi_ms, 0.1) for isi_ms in (100.0, 250.0, 400.0)])
-    assert torch.equal(two.latents[1], alone.latents[0])
+    assert torch.equal(two.drawn.latents[1], alone.drawn.latents[0])
     assert two.estimate(1).probability == alone.estimate().probability
 
 

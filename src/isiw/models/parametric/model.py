@@ -1,15 +1,15 @@
 """The parametric window model: a Gaussian window on a floor, with noise that depends on the level, as a Pyro program.
 
-Its posterior is sampled again after every trial, whatever their order. With and without a window are two models,
-weighed by their evidence. The floor is unknown, so that the least-excess rule is applied above the baseline.
+Its posterior is sampled again after each trial, whatever their order, when somebody looks at it. With and without a
+window are two models, weighed by their evidence. The floor is unknown, so that the least-excess rule is applied above
+the baseline.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -60,23 +60,13 @@ class ParametricModel(Checked):
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParametricPosterior:
         """The posterior before the first trial."""
-        return self._after(space, seed, History.empty(people))
+        return ParametricPosterior(self, space, seed, History.empty(people))
 
     def update(self, posterior: ParametricPosterior, observation: Observation) -> ParametricPosterior:
-        """The posterior after one more trial."""
-        return self.update_by_all(posterior, (observation,))
-
-    def update_by_all(self, posterior: ParametricPosterior, observations: Sequence[Observation]) -> ParametricPosterior:
-        """The posterior after several more trials: the same as after one by one, at the cost of one.
-
-        Args:
-            posterior: the posterior before them.
-            observations: the trials, in order.
-        """
+        """The posterior after one more trial, which is sampled when somebody looks at it."""
         history = posterior.history
-        for observation in observations:
-            history = history.appended(self.observed(observation, history.trials))
-        return self._after(posterior.space, posterior.seed, history)
+        history = history.appended(self.observed(observation, history.trials))
+        return ParametricPosterior(self, posterior.space, posterior.seed, history)
 
     def observed(self, observation: Observation, order: int) -> History:
         """One trial of each person as a history.
@@ -100,29 +90,40 @@ class ParametricModel(Checked):
         mask = person.window_masks(torch.tensor(space.grid_ms))[0, 0]
         return PriorPerson(Window.from_mask(space.grid_ms, mask.numpy()), log_mep.exp()[0, 0].numpy())
 
-    def _after(self, space: DesignSpace, seed: int, history: History) -> ParametricPosterior:
-        people, trials = len(history.columns), history.trials
+    def sampled(self, space: DesignSpace, seed: int, history: History) -> Samples:
+        """Samples of the posterior of b people, drawn for the number of their trials.
+
+        Args:
+            space: in whose range a window is sought.
+            seed: of the draws, with the number of trials.
+            history: the trials.
+        """
         fits = [
             sample_person(
                 self.program(space),
                 Trials.of(history, person),
                 self.samples,
                 self.effort,
-                step_generator(seed, trials),
+                step_generator(seed, history.trials),
                 self.chains if self.method == "nuts" else None,
             )
-            for person in range(people)
+            for person in range(len(history.columns))
         ]
-        return ParametricPosterior(
-            model=self,
-            space=space,
-            seed=seed,
-            history=history,
-            latents=torch.stack([fit.latents for fit in fits]),
-            present=torch.stack([fit.present for fit in fits]),
-            evidence=np.array([fit.log_evidence for fit in fits]),
-            trouble=" ".join(fit.trouble for fit in fits if fit.trouble) or None,
+        return Samples(
+            torch.stack([fit.latents for fit in fits]),
+            torch.stack([fit.present for fit in fits]),
+            np.array([fit.log_evidence for fit in fits]),
+            " ".join(fit.trouble for fit in fits if fit.trouble) or None,
         )
+
+
+class Samples(NamedTuple):
+    """Equally weighted samples of b people."""
+
+    latents: Tensor  # (b, s, d)
+    present: Tensor  # there is any excess, (b, s)
+    evidence: FloatArray  # log marginal likelihood of the trials [nat], (b,)
+    trouble: str | None = None  # with how they were drawn, and what stands in for it
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,10 +186,17 @@ class ParametricPosterior:
     space: DesignSpace
     seed: int
     history: History  # the trials so far, in order
-    latents: Tensor  # equally weighted samples, (b, s, d)
-    present: Tensor  # there is any excess, (b, s)
-    evidence: FloatArray  # log marginal likelihood of the trials [nat], (b,)
-    trouble: str | None  # with the last fit, and what stands in for it
+    conditioned: Samples | None = None  # by imagined trials
+
+    @cached_property
+    def drawn(self) -> Samples:
+        """Its samples. They rest on nothing but the trials, so that who learns many in a row draws none in between."""
+        return self.conditioned or self.model.sampled(self.space, self.seed, self.history)
+
+    @property
+    def trouble(self) -> str | None:
+        """What is wrong with its samples; see `ReportsTrouble`."""
+        return self.drawn.trouble
 
     @property
     def trials(self) -> int:
@@ -203,8 +211,8 @@ class ParametricPosterior:
     @cached_property
     def sample(self) -> WindowSample:
         """The unknowns that the samples stand for."""
-        unknowns = self.model.program(self.space).unknowns(self.latents)
-        return WindowSample(unknowns, self.present, self.model.likelihood, self.space)
+        unknowns = self.model.program(self.space).unknowns(self.drawn.latents)
+        return WindowSample(unknowns, self.drawn.present, self.model.likelihood, self.space)
 
     def outcome_mass(self, isi_ms: Array) -> Singles:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
@@ -230,17 +238,18 @@ class ParametricPosterior:
         gain = log_likelihood(self.sample.unknowns, level, ends, self.model.likelihood).squeeze(-1)
         log_mean = torch.logsumexp(gain, dim=-1, keepdim=True)
         picks = torch.from_numpy(systematic(gain.numpy(), gain.shape[-1]))
-        return replace(
-            self,
-            history=self.history.appended(trial),
-            latents=self.latents.gather(1, picks.unsqueeze(-1).expand_as(self.latents)),
-            present=self.present.gather(1, picks),
-            evidence=self.evidence + log_mean.squeeze(-1).numpy() - np.log(gain.shape[-1]),
+        latents, present, evidence, trouble = self.drawn
+        conditioned = Samples(
+            latents.gather(1, picks.unsqueeze(-1).expand_as(latents)),
+            present.gather(1, picks),
+            evidence + log_mean.squeeze(-1).numpy() - np.log(gain.shape[-1]),
+            trouble,
         )
+        return replace(self, history=self.history.appended(trial), conditioned=conditioned)
 
     def log_evidence(self) -> FloatArray:
         """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
-        return self.evidence
+        return self.drawn.evidence
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
