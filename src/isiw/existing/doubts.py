@@ -189,7 +189,7 @@ def _require_ascending(columns: Columns) -> None:
         return
     order = replace(order, decimal=columns["isi"].decimal)
     known = {row: text for row in columns.rows if (text := order.text(row))}
-    odd = [row for row, text in known.items() if not re.sub("[.,]", "", text).lstrip("-").isdigit()]
+    odd = [row for row, text in known.items() if order.name == columns["date"].name or not _is_number(text)]
     if 0 < len(odd) < len(known):
         raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
     places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
@@ -204,6 +204,10 @@ def _require_ascending(columns: Columns) -> None:
         remedy = 'Leave one row for each trial, such as that of one muscle: --where "muscle=FCR"; or name a column of '
         remedy += "people or blocks: --column subject=NAME, --column block=NAME."
         raise InvalidValueError(what, got=repeated, remedy=remedy)
+
+
+def _is_number(text: str) -> bool:
+    return re.sub("[.,]", "", text).lstrip("-").isdigit()
 
 
 def _numbers_all(column: Column, columns: Columns) -> bool:
@@ -237,7 +241,7 @@ def _require_one_kind(columns: Columns) -> None:
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
     for name, column in columns.beside.items():
         texts = [text for _, row in by_isi if (text := column.text(row))]
-        are_words = not any(re.sub("[.,]", "", text).lstrip("-").isdigit() for text in texts)
+        are_words = not any(map(_is_number, texts))
         kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
         if name in columns.layout.where or len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
             continue
