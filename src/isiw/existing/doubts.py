@@ -183,9 +183,7 @@ def require_codes(columns: Columns) -> None:
 
 def _require_ascending(columns: Columns) -> None:
     """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
-    numbered = (each for each in columns.beside.values() if _numbers_all(each, columns))
-    order = columns.of.get("order") or columns.of.get("date") or next(numbered, None)
-    if order is None or "block" in columns.of:
+    if (order := columns.of.get("order") or columns.of.get("date")) is None or "block" in columns.of:
         return
     order = replace(order, decimal=columns["isi"].decimal)
     known = {row: text for row in columns.rows if (text := order.text(row))}
@@ -208,13 +206,6 @@ def _require_ascending(columns: Columns) -> None:
 
 def _is_number(text: str) -> bool:
     return re.sub("[.,]", "", text).lstrip("-").isdigit()
-
-
-def _numbers_all(column: Column, columns: Columns) -> bool:
-    """True if a column has each number from one to another once, as an order of delivery has."""
-    numbers = [int(text) if (text := column.text(row)).isdigit() else -1 for row in columns.rows]
-    every = {*range(min(numbers), min(numbers) + max(len(numbers), _FEWEST))}
-    return {*numbers} == every and column.name not in columns.layout.where
 
 
 def require_said(columns: Columns) -> None:
