@@ -118,8 +118,8 @@ def test_files_of_bids_beside_a_recording_that_contradict_it_are_asked_about(tmp
     events.to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)
     require_as_written(read_people(path, KNOWN.saying(units=("uV",)))[0])
     events.assign(onset=1e3 * events["onset"]).to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)
-    with pytest.raises(IsiwError, match="no sweep of"):
-        read_people(path, KNOWN.saying(units=("uV",)))
+    with pytest.raises(IsiwError, match=r"onsets of events beside sub-01_emg\.edf are not those of their samples"):
+        read_people(path, KNOWN)
 
 
 def test_times_of_an_eeglab_file_are_compared_with_its_rate(tmp_path: Path) -> None:

@@ -244,6 +244,12 @@ class Contents:
         tracks = tuple(one.with_unit(units.get(one.name)) for one in self.tracks)
         if not len(events):
             return replace(self, tracks=tracks)
+        off = (events["onset"] * tracks[0].rate_hz - events.get("sample", np.nan)).abs().median() if tracks else 0.0
+        if tracks and off > 0.1 * tracks[0].rate_hz:
+            what = f"the onsets of events beside {self.source} are not those of their samples"
+            got, expected = f"a difference of {off:.0f} samples", f"seconds, at {tracks[0].rate_hz:g} Hz"
+            remedy = "Correct the onsets, or the samples, in the file of events."
+            raise InvalidValueError(what, got=got, expected=expected, remedy=remedy)
         named = [events[one] for one in ("trial_type", "value") if one in events and events[one].notna().any()]
         names = [text_of(each) for each in named[0]] if named else ""
         return replace(self, tracks=tracks, events=events.assign(name=names))
