@@ -33,6 +33,8 @@ from isiw.existing.reading import read_people
 IMPACT = Layout(reference="impact")
 ISIS = np.repeat(np.arange(20.0, 181.0, 20.0), 4)
 
+TIMES = [f"2026-03-04 10:{n:02d}:00" for n in range(36)]
+
 
 def table(**more: Any) -> pd.DataFrame:
     """36 pairs, in an order of their own."""
@@ -115,6 +117,16 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
                                 "counts from another event than is stated; got 'impact'"),
     "remarks that leave out": (table(Bemerkung=np.where(np.arange(36) == 5, "Verworfen!", "")), {},
                                "'Bemerkung' .* says that the trial does not count"),
+    "remarks of several words": (table(note=np.where(np.arange(36) == 5, "coil moved - discard", "no artefact")), {},
+                                 "says that the trial does not count; got .*discard"),
+    "a code for no amplitude": (table(mep_uv=np.where(np.arange(36) % 9, 412.5, 999)).drop(columns="mep_mv"), {},
+                                "may stand for no amplitude; got .*999"),
+    "rows sorted by their ISIs": (table(stim_nr=range(36)).sort_values("isi_ms"), {}, "order of its column 'stim_nr'"),
+    "the newest row first": (table().assign(timestamp=TIMES)[::-1], {}, "'timestamp'"),
+    "the newest row first, by dates": (table().assign(date=TIMES)[::-1], {}, "'date'"),
+    "the last rows twice": (pd.concat([table(), table()[-6:]]), {}, "or each row twice"),
+    "a measured ISI beside": (table(measured_isi_ms=ISIS + 8), {}, "isi_ms or measured_isi_ms"),
+    "before and after in a column called time": (table(time=of(["pre", "post"])), {}, "'time'.*(pre, post|post, pre)"),
     "a word for ISIs of 0": (table(stim=np.where(ISIS > 20, "cond", "uncond")).replace(20.0, 0.0), {}, "--alone 0 if"),
     "numbers of rows": (table().assign(isi_ms=np.arange(1.0, 37.0)), {}, "in the column 'isi_ms' are the numbers of"),
     "two columns of ISIs": (table(realised_isi_ms=ISIS + 40), {}, "isi_ms or realised_isi_ms"),

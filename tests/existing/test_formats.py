@@ -258,8 +258,7 @@ def test_spike2_8_is_read_by_sonpy_on_windows(tmp_path: Path, monkeypatch: pytes
         ReadFloats=lambda _, _most, at: emg_uv[at // 25 :][:8000],
     )
     module = SimpleNamespace(SonFile=lambda _, bReadOnly: held)  # noqa: ARG005, N803 - as sonpy calls it
-    monkeypatch.setitem(sys.modules, "sonpy", SimpleNamespace(lib=module))
-    monkeypatch.setitem(sys.modules, "sonpy.lib", module)
+    monkeypatch.setitem(sys.modules, "sonpy", module)
     monkeypatch.setattr(sys, "platform", "win32")
     (tmp_path / "P01.smrx").write_bytes(b"x")
     require_as_written(read(tmp_path / "P01.smrx"))

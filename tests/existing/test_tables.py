@@ -137,6 +137,23 @@ def test_blocks_and_dates_are_kept() -> None:
     assert person.created.startswith("2024-05-01T10:00")
 
 
+def test_cells_with_units_and_words_for_tms_alone_are_read_and_so_are_latencies_with_commas(tmp_path: Path) -> None:
+    rows = "".join(
+        f"{isi}ms;0,{isi} mV;21,{isi % 20}\nTS alone;0,{isi + 1} mV;21,{isi % 20}\n" for isi in range(10, 90)
+    )
+    (tmp_path / "P01.csv").write_text(f"ISI;MEP;latency\n{rows}")
+    (person,) = read_people(tmp_path / "P01.csv", IMPACT)
+    assert [trial.isi_ms for trial in person.trials][:3] == [10.0, None, 11.0]
+    assert [trial.mep_mv for trial in person.trials][:3] == [0.1, 0.11, 0.11]
+
+
+def test_times_with_decimal_commas_are_an_order(tmp_path: Path) -> None:
+    rows = "".join(f"{6 * n},5;{10 + n};0,{30 + n}\n" for n in range(20))
+    (tmp_path / "P01.csv").write_text(f"Zeit;ISI (ms);MEP (mV)\n{rows}")
+    (person,) = read_people(tmp_path / "P01.csv", IMPACT)
+    assert len(person.trials) == 20
+
+
 @pytest.mark.parametrize(
     ("dates", "given_by"),
     [

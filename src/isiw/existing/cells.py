@@ -166,12 +166,12 @@ def _doubtful(column: Column) -> str | None:
 
 def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:
     """A column whose cells all say the same unit, such as "12.5 ms", as one whose name says it."""
-    texts = [cell for cell in cells if not is_missing(cell)]
+    texts = [cell for cell in cells if not is_missing(cell) and not says_alone(cell, None)]
     unit, *others = {_NUMBER_BEFORE.sub("", cell.casefold()) if isinstance(cell, str) else "" for cell in texts} or {""}
     if others or (known := unit_named(unit)) is None:
         return name, cells
-    bare = [cell if is_missing(cell) else cell.strip()[: -len(unit)].strip() for cell in cells]
-    return f"{name} ({known})", bare
+    bare = {cell: cell.strip()[: -len(unit)].strip() for cell in texts}
+    return f"{name} ({known})", [bare.get(cell, cell) for cell in cells]
 
 
 def dates_of(column: Column, rows: Iterable[int]) -> dict[int, dt.datetime]:

@@ -7,6 +7,7 @@ import re
 import statistics
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
@@ -55,6 +56,7 @@ _OTHERWISE: Final = (
 """What the name of a column says of its numbers if they are no amplitudes or ISIs, and what is expected."""
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
 _FEW: Final = 3
+_WORDS: Final = 4  # in a longer remark a word such as bad may be of something else
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
 _FEWEST: Final = 12  # in a table with fewer rows ISIs may come again by chance
 _SHARED: Final = 0.8
@@ -115,10 +117,16 @@ def _is_spread(name: str) -> bool:
 def require_no_verdicts(beside: Iterable[Column]) -> None:
     """Raise if a column of which nothing is read says that a trial does not count."""
     for column in beside:
-        texts = {cell: cell.partition(":")[0].strip(" !.?#*()[]") for cell in column.cells if isinstance(cell, str)}
-        if odd := next((text for text, word in texts.items() if word.casefold() in WORDS["left out"]), None):
+        texts = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
+        if (odd := next(filter(_is_verdict, texts), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(odd), "says that the trial does not count", remedy)
+
+
+def _is_verdict(text: str) -> bool:
+    said = text.casefold().partition(":")[0].strip(" !.?#*()[]")
+    words = {said, *(re.findall(r"\w+", said) if said.count(" ") < _WORDS else ())}
+    return not words.isdisjoint(WORDS["left out"]) and words.isdisjoint(WORDS["no"])
 
 
 def require_reference(isi: Column, reference: Reference | None) -> None:
@@ -175,10 +183,11 @@ def require_codes(columns: Columns) -> None:
 
 def _require_ascending(columns: Columns) -> None:
     """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
-    if (order := columns.of.get("order")) is None or "block" in columns.of:
+    if (order := columns.of.get("order") or columns.of.get("date")) is None or "block" in columns.of:
         return
+    order = replace(order, decimal=columns["isi"].decimal)
     known = {row: text for row in columns.rows if (text := order.text(row))}
-    odd = [row for row, text in known.items() if not re.sub("[.,]", "", text).lstrip("-").isdigit()]
+    odd = [row for row, text in known.items() if order.name == columns["date"].name or not _is_number(text)]
     if 0 < len(odd) < len(known):
         raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
     places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
@@ -188,11 +197,15 @@ def _require_ascending(columns: Columns) -> None:
         raise InvalidValueError(what, remedy=remedy)
     times = Counter(places)
     repeated = next((text for text, place in zip(known.values(), places, strict=False) if times[place] > 1), None)
-    if not odd and repeated is not None:
+    if "order" in columns.of and not odd and repeated is not None:
         what = f"a trial has two rows and more in {order.of}, by its column {order.name!r}"
         remedy = 'Leave one row for each trial, such as that of one muscle: --where "muscle=FCR"; or name a column of '
         remedy += "people or blocks: --column subject=NAME, --column block=NAME."
         raise InvalidValueError(what, got=repeated, remedy=remedy)
+
+
+def _is_number(text: str) -> bool:
+    return re.sub("[.,]", "", text).lstrip("-").isdigit()
 
 
 def require_said(columns: Columns) -> None:
@@ -219,7 +232,7 @@ def _require_one_kind(columns: Columns) -> None:
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
     for name, column in columns.beside.items():
         texts = [text for _, row in by_isi if (text := column.text(row))]
-        are_words = not any(text.replace(".", "").lstrip("-").isdigit() for text in texts)
+        are_words = not any(map(_is_number, texts))
         kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
         if name in columns.layout.where or len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
             continue
@@ -273,6 +286,11 @@ def _is_named(columns: Columns, isi_ms: float) -> bool:
 
 def _require_one_unit(columns: Columns) -> None:
     """Raise if some numbers cannot be what they are, are about a thousand times the others, and none lies between."""
+    mep, codes = columns["mep"], {"99", "999", "9999"} if columns["mep"].name not in columns.layout.where else ()
+    coded = [row for row in columns.rows if mep.text(row).removesuffix(".0") in codes]
+    if len(coded) >= _FEW and len({mep.text(row) for row in coded}) == 1:
+        remedy = f'If it does, leave these cells empty; if not, say --where "{mep.name}={ALL}".'
+        raise mep.refused(coded[0], "may stand for no amplitude", remedy)
     for key, (least, most) in _POSSIBLE.items():
         column = columns[key]
         numbers = np.sort([number for row in columns.paired if (number := column.number(row)) and number > 0])
@@ -305,7 +323,10 @@ def _require_one_row_each(columns: Columns) -> None:
     runs = [len([*each]) for _, each in groupby(texts)]
     times, half = math.gcd(*runs), len(texts) // 2
     are_whole = all(round(isi.number(row) or 0.0, 3).is_integer() for row in columns.paired)
-    again = texts[:half] == texts[half:] and (meps[:half] == meps[half:] or not are_whole)  # as realised ISIs never do
+    again = texts[:half] == texts[half:] and not are_whole  # as realised ISIs never do
+    four = zip(*(zip(texts[n:], meps[n:], strict=False) for n in range(4)), strict=False)
+    times_of_four = Counter(rows for rows in four if len({mep for _, mep in rows}) == 4)
+    again |= max(times_of_four.values(), default=0) > 1  # nor four trials in a row
     if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
         what = f"the ISIs of {isi.of} come {max(times, 2)} times each, as if there was a row for each of several "
         what += "muscles, or each row twice"

@@ -18,81 +18,13 @@ from isiw.types import Reference
 
 ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µs": 1e-3, "μs": 1e-3}
 EMG_UNITS: Final[Mapping[str, float]] = {**EMG_UNITS_MV, "nV": 1e-6}  # in mV
-_UNITS: Final = {
-    "ms": "ms msec msecs millisec millisecond milliseconds millisekunden millisecondes milisegundos millisecondi "
-          "milliseconden",
-    "s": "s sec secs second seconds sekunden secondes segundos secondi seconden",
-    "us": "us µs μs microsecond microseconds",
-    "V": "v volt volts",
-    "mV": "mv mvolt mvolts millivolt millivolts milivoltios",
-    "uV": "uv µv μv microv uvolt uvolts µvolt µvolts microvolt microvolts mikrovolt microvoltios",
-    "nV": "nv nvolt nanovolt nanovolts",
-    "samples": "sample samples frames",
-    "mV·ms": "mvms mv*ms mv·ms uvms uv*ms uv·ms µvms µv*ms µv·ms μv·ms",  # of areas, and of no amplitude
-    "%": "%",
-}  # fmt: skip
-UNIT_WORDS: Final[Mapping[str, str]] = {word: unit for unit, words in _UNITS.items() for word in words.split()}
+_FOUND: Final = read_toml(Path(__file__).with_name("words.toml"))
+UNIT_WORDS: Final[Mapping[str, str]] = {word: unit for unit, words in _FOUND["units"].items() for word in words}
 """Units as files write them, in lower case."""
-_COLUMNS: Final = {
-    "isi": "isi realisedisi isirealised actualisi interstimulusinterval interpulseinterval ipi "
-           "interstimulusintervall interval delay soa intervall reizabstand abstand verzögerung "
-           "intervalle intervalo intervallo",
-    "mep": "mep mepamplitude mepamp mepp2p meppp mepptp meppeaktopeak mepsize ptpmep mepspitzespitze amplitude "
-           "peaktopeak peaktopeakamplitude emgpeaktopeak p2pamplitude ptpamplitude p2p ptp amp spitzespitze "
-           "amplitud ampiezza amplitudecrêteàcrête amplitudpicoapico ampiezzapiccopicco piekpiek",
-    "asked": "commandedisi askedisi nominalisi targetisi plannedisi isicommanded isinominal sollisi sollintervall",
-    "isi_sd": "isisd",
-    "background": "backgroundrms background prestimrms rmsbackground baselinerms hintergrund",
-    "status": "status accepted accept valid include included keep good usable clean gültig verwertbar valide válido "
-              "valido geldig",
-    "exclude": "excluded exclude rejected reject bad artefact artifact artefacts artifacts ausschluss ausgeschlossen "
-               "verworfen artefakt exclu rejeté artéfact excluido rechazado artefacto escluso scartato artefatto "
-               "uitgesloten verworpen",
-    "reason": "reason grund",
-    "tap_alone": "tapalone",
-    "tms_alone": "tmsalone tmsonly singlepulse singletms pulsealone",
-    "intensity": "intensitypctrmt pctrmt intensityrmt percentrmt intensitypercentrmt",
-    "subject": "subject subjectid participant participantid subj person patient sub proband probandin "
-               "versuchsperson vp teilnehmer teilnehmerin sujet sujeto participante soggetto partecipante proefpersoon "
-               "deelnemer id",
-    "day": "day visit session sessionid ses sitzung termin messtag séance sesión sessione sessie",
-    "condition": "condition trialtype stimulus type bedingung reizart condición condizione conditie",
-    "block": "block run bloc bloque blocco blok",
-    "order": "trial trialnumber trialno trialnr index onset time durchgang uhrzeit essai ensayo prova",
-    "date": "date recordingdate datum fecha",
-}  # fmt: skip
-COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {key: tuple(names.split()) for key, names in _COLUMNS.items()}
+COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {key: tuple(names) for key, names in _FOUND["columns"].items()}
 """By what they are called in letters alone, the columns that are found without being named; the first name wins."""
-_SETS: Final = {
-    "missing": ",nan,(null),na,n/a,none,null,<na>,nat,-,--,–,—,.,?,k.a.,n.d.",
-    "yes": "1,1.0,true,yes,y,x,ja,j,oui,sí,si,sì",
-    "no": "0,0.0,false,no,n,nein,non,nee",
-    "counted": "accepted,accept,ok,good,valid,keep,gut,gültig",
-    "alone": "tms alone,tms only,tms,single,single pulse,single tms,sp,alone,ts,baseline,control,unconditioned,"
-             "unpaired,ts alone,ts only,test,test alone,test only,test pulse,test stimulus,no tap,nur tms,tms allein,"
-             "einzelpuls,einzelreiz,kontrolle,ohne tap,ohne schlag,tms seule,smt seule,contrôle,tms sola,tms solo,"
-             "alleen tms",
-    "tap alone": "tap alone,tap only,hit only,hammer only,no tms,no pulse,cs alone,cs only,conditioning alone,"
-                 "conditioning only,nur tap,nur schlag,tap allein,ohne tms",
-    "left out": "mistrial,rejected,reject,bad,invalid,excluded,exclude,discard,discarded,artefact,artifact,outlier,"
-                "schlecht,ungültig,verworfen,ausgeschlossen,artefakt,ausreißer,exclu,rejeté,à rejeter,artéfact,mauvais,"
-                "excluido,rechazado,descartado,artefacto,inválido,escluso,scartato,da scartare,artefatto,uitgesloten,"
-                "verworpen,afgekeurd,ongeldig,slecht",
-    "spreads": "sd,std,stdev,stddev,se,sem,stderr,cv,sds,standarddeviation,standarderror,ci,iqr,var,variance,"
-               "stdabw,stabw,standardabweichung,standardfehler,streuung,varianz,écarttype,erreurtype,desviaciónestándar,"
-               "desvest,errorestándar,deviazionestandard,standaarddeviatie,standaardfout",
-    "beside spreads": "mep,amplitude,of,lower,upper,low,high,mv,uv,v,95",
-    "sums": "sum,total,grand mean,summe,gesamt,somme,suma,somma,som,totale,totaal",
-    "numbers": "n,count,ntrials,trials,ntrial,nobs,nsweeps,sweeps,anzahl,nmep,nmeps,naveraged,averaged,numberoftrials,"
-               "anzahlreize,nombre,nombredessais,número,númerodeensayos,numero,aantal",
-    "vague": "interval,intervalle,intervalo,intervallo,delay,soa,amplitude,amp,peaktopeak,peaktopeakamplitude,"
-             "emgpeaktopeak,p2pamplitude,ptpamplitude,p2p,ptp",
-    "rates": "fs,srate,samplerate,samplingrate,samplingfrequency,sfreq,rate,ratehz",
-    "periods": "interval,samplinginterval,sampleinterval,dt",
-}  # fmt: skip
-WORDS: Final[Mapping[str, frozenset[str]]] = {kind: frozenset(words.split(",")) for kind, words in _SETS.items()}
-"""In lower case, what cells say (up to left out), and names of columns, in letters alone: of spreads and sums, of
-numbers of trials, vague ones that give way to others, and of rates and periods of sampling."""
+WORDS: Final[Mapping[str, frozenset[str]]] = {kind: frozenset(words) for kind, words in _FOUND["words"].items()}
+"""Words of cells, and of columns' names in letters alone, by what they say."""
 MARKS: Final[Mapping[str, tuple[str, str]]] = {
     "pulse": ("the pulse of TMS", "tms pulse tmspulse magneticpulse"),
     "tap": ("the tap (its impact) or the electrical pulse", "tap impact hit electricalpulse conditioning pns"),

@@ -124,6 +124,8 @@ def _is_another(key: str, columns: Mapping[str, Column]) -> bool:
         return letters(columns[key].name) == "id" and 1 < len(texts) == len({*texts})
     if key == "tms_alone":
         return not {*map(str.casefold, texts)} <= {"", *WORDS["yes"], *WORDS["no"]}
+    if key == "order":  # such as before and after
+        return not any(re.search(r"\d", text) for text in columns[key].texts)
     return key == "reason" and not {"status", "exclude"} & columns.keys()
 
 

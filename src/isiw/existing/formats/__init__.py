@@ -62,7 +62,7 @@ FORMATS: Final = (
     Format("NWB", (".nwb",), nwb.read, "Is it a file of NWB 2, and complete?", "pynwb"),
     Format("SPSS and Stata", tuple(STATISTICS), columns.read, _TABLE, "pyreadstat", is_table=True),
     Format("Signal", (".cfs",), programs.cfs, f"{_CFS} {_ASKED}", "biosig", install=_GPL),
-    Format("Spike2 from version 8 on", (".smrx",), spike2.smrx, _SMRX, "sonpy.lib",
+    Format("Spike2 from version 8 on", (".smrx",), spike2.smrx, _SMRX, "sonpy",
            install="pip install sonpy, whose licence is its own", on_windows=True),
     Format("LabChart", (".adicht",), programs.adicht, f"{_ADICHT} {_ASKED}", "adi",
            install="pip install adi-reader, whose licence is its own", on_windows=True),
