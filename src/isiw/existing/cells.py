@@ -33,10 +33,15 @@ _REMEDY: Final = "Write dates as 2026-01-31."
 _MANY: Final = 2**16  # so many texts are remembered: in a long table most cells are like others
 
 
+@lru_cache(_MANY)
+def _says_nothing(text: str) -> bool:
+    return text.strip().casefold() in WORDS["missing"]
+
+
 def is_missing(cell: Any) -> bool:
     """True if a cell holds nothing."""
     if isinstance(cell, str):
-        return cell.strip().casefold() in WORDS["missing"]
+        return _says_nothing(cell)
     return cell is None or type(cell).__name__ in {"NAType", "NaTType"} or cell != cell  # noqa: PLR0124 - NaN
 
 
