@@ -66,20 +66,16 @@ def require_capabilities(acquisition: AcquisitionFunction, model: object, poster
         )
 
 
-def require_made(given: object, what: str) -> None:
-    """Raise if a class is given for an object of it."""
-    if isinstance(given, type):
-        remedy = f"Make one: {given.__name__}()."
-        raise StrategyError(f"{what} is needed, and not its class", got=given, remedy=remedy)
-
-
-def require_acquisition(given: object) -> None:
-    """Raise if something else is given for an acquisition function."""
-    require_made(given, "an acquisition function")
-    if not (isinstance(given, AcquisitionFunction) and isinstance(given.needs, Iterable)):
+def require_objects(model: object, acquisition: object) -> None:
+    """Raise if a class is given for an object of it, or something else for an acquisition function."""
+    for what, given in (("an acquisition function", acquisition), ("a model", model)):
+        if isinstance(given, type):
+            remedy = f"Make one: {given.__name__}()."
+            raise StrategyError(f"{what} is needed, and not its class", got=given, remedy=remedy)
+    if not (isinstance(acquisition, AcquisitionFunction) and isinstance(acquisition.needs, Iterable)):
         raise StrategyError(
             "it cannot be an acquisition function",
-            got=given,
+            got=acquisition,
             expected="something that can be called with a posterior and ISIs, and has needs",
             remedy="Give its class `needs`, a tuple of what it uses of isiw.models.protocol; () where it uses nothing.",
         )

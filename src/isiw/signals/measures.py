@@ -1,7 +1,7 @@
 """Measures of an MEP beside its amplitude: onset, duration, area and, in a contracted muscle, the silent period.
 
 Duration and area are from onset to end, the area that of the rectified EMG [Jackson2019]; the silent period is from the
-pulse until the moving SD of the EMG is back at its mean from before [Summers2020].
+pulse until the moving SD of the EMG is back at its mean from before [Summers2020], to the sample.
 """
 
 from __future__ import annotations

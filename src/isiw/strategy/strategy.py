@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
-from isiw.acquisition.protocol import (
-    AcquisitionFunction,
-    greedy_batch,
-    require_acquisition,
-    require_capabilities,
-    require_made,
-)
+from isiw.acquisition.protocol import AcquisitionFunction, greedy_batch, require_capabilities, require_objects
 from isiw.checks import amplitude, deadline, flag, number, whole
 from isiw.decision import StopDecision
 from isiw.design import DesignSpace, require_space
@@ -65,8 +59,7 @@ class Strategy:
         intensities: Intensities = NONE,
     ) -> None:
         require_space(space)
-        require_acquisition(acquisition)
-        require_made(model, "a model")
+        require_objects(model, acquisition)
         seed = whole("the seed", seed, least=0)
         self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
         self.intensities, self.initial_ms = intensities, tuple(space.snap(isi_ms) for isi_ms in initial_ms)

@@ -130,17 +130,17 @@ def test_the_posterior_agrees_with_plain_importance_sampling_from_the_prior(like
 
 
 @pytest.mark.slow
-def test_who_looks_in_between_has_the_same_posterior() -> None:
+def test_use_in_between_leaves_the_posterior_the_same() -> None:
     model = ParametricModel(likelihood="gamma")
     observations = evenly("gaussian", 2, 6)
-    looked_at = model.begin(VALVE_SPACE, 1)
+    used = model.begin(VALVE_SPACE, 1)
     for each in observations:
-        looked_at = model.update(looked_at, each)
-        looked_at.estimate()
-    assert torch.equal(looked_at.drawn.latents, after(model, observations).drawn.latents)
+        used = model.update(used, each)
+        used.estimate()
+    assert torch.equal(used.drawn.latents, after(model, observations).drawn.latents)
 
 
-def test_nothing_is_drawn_before_somebody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_drawn_before_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("isiw.models.parametric.model.sample_person", None)
     posterior = after(ParametricModel(), evenly("gaussian", 2, 6))
     assert posterior.trials == 6

@@ -1,7 +1,7 @@
 """The parametric window model: a Gaussian window on a floor, with noise that depends on the level, as a Pyro program.
 
-Its posterior is sampled again after each trial, whatever their order, when somebody looks at it. With and without a
-window are two models, weighed by their evidence. The floor is unknown, so that the least-excess rule is applied above
+Its posterior is sampled again from all trials, whatever their order, when it is first used. With and without a window
+are two models, weighed by their evidence. The floor is unknown, so that the least-excess rule is applied above
 the baseline.
 """
 
@@ -63,7 +63,7 @@ class ParametricModel(Checked):
         return ParametricPosterior(self, space, seed, History.empty(people))
 
     def update(self, posterior: ParametricPosterior, observation: Observation) -> ParametricPosterior:
-        """The posterior after one more trial, which is sampled when somebody looks at it."""
+        """The posterior after one more trial, which is sampled when it is first used."""
         history = posterior.history
         history = history.appended(self.observed(observation, history.trials))
         return ParametricPosterior(self, posterior.space, posterior.seed, history)
@@ -190,7 +190,7 @@ class ParametricPosterior:
 
     @cached_property
     def drawn(self) -> Samples:
-        """Its samples. They rest on nothing but the trials, so that who learns many in a row draws none in between."""
+        """Its samples. They depend on the trials alone: while many are learnt in a row, none are drawn in between."""
         return self.conditioned or self.model.sampled(self.space, self.seed, self.history)
 
     @property
