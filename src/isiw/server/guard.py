@@ -364,6 +364,7 @@ def _in_pieces(send: Send) -> Send:
         last = max(0, len(body) - 1) // PIECE * PIECE
         for begin in range(0, last, PIECE):
             await send({**message, "body": body[begin : begin + PIECE], "more_body": True})
+            await asyncio.sleep(0)  # the loss of the connection is heard of here, before more is written to it
         await send(message if last == 0 else {**message, "body": body[last:]})
 
     return sent

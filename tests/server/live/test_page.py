@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import struct
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -241,6 +242,25 @@ def test_viewers_that_never_read_or_vanish_do_not_hold_a_session_up(
         watched.page.close()
         silent.close()
     assert len(watched.record.table) == 20
+    assert capfd.readouterr().err == ""
+
+
+def test_who_vanishes_while_news_is_put_together_is_written_to_no_more(
+    watched: Watched, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    viewers = [_asking(watched.client) for _ in range(2)]
+
+    def shown_to_nobody(view: View) -> Shown:
+        shown = _larger_than_any_buffer(view)
+        for viewer in viewers:
+            viewer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # gone at once
+            viewer.close()
+        return shown
+
+    monkeypatch.setattr(View, "shown", shown_to_nobody)
+    watched.start()
+    watched.finish()
+    watched.page.close()
     assert capfd.readouterr().err == ""
 
 
