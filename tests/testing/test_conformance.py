@@ -190,7 +190,7 @@ class Scoring:
 @pytest.mark.parametrize(
     ("acquisition", "promise"),
     [
-        (Scoring(flat), "shape"),
+        (Scoring(lambda _posterior, _isi_ms: np.zeros(1)), "shape"),
         (Scoring(of_each_sample), "for 1 ISI of 1 person"),
         (cast("Any", Scoring), "is no class"),
         (Scoring(undecided), "finite"),
@@ -203,6 +203,11 @@ class Scoring:
 def test_the_suite_finds_a_broken_acquisition_function(acquisition: AcquisitionFunction, promise: str) -> None:
     with pytest.raises(AssertionError, match=promise):
         check_acquisition(acquisition, particles_after(()), VALVE_SPACE)
+
+
+@pytest.mark.parametrize("people", [1, 3])
+def test_scores_may_be_the_same_for_all_people(people: int) -> None:
+    check_acquisition(Scoring(flat), particles_after((), people), VALVE_SPACE)
 
 
 def test_a_suite_that_is_given_what_it_makes_itself_says_so() -> None:

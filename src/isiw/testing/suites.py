@@ -368,9 +368,10 @@ def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, sp
         isi_ms = np.linspace(space.low_ms, space.high_ms, count, dtype=np.float32)
         scores = _array("scores", acquisition(posterior, isi_ms))
         people = people_of(posterior, isi_ms)
-        shaped = scores.ndim == 2 and scores.shape[1] == count and (people is None or len(scores) in (1, people))
+        alike = scores.shape in {(count,), (1, count)}  # for all people
+        shaped = alike or (scores.ndim == 2 and scores.shape == (people or len(scores), count))
         of = "" if people is None else f" of {counted(people, 'person', 'people')}"
-        require(shaped, "scores have the shape (b, t)", f"{scores.shape} for {counted(count, 'ISI')}{of}")
+        require(shaped, "scores have the shape (t,) or (b, t)", f"{scores.shape} for {counted(count, 'ISI')}{of}")
         require(bool(np.isfinite(scores).all()), "scores are finite", str(scores.tolist()))
         require(np.array_equal(scores, acquisition(posterior, isi_ms)), "the same posterior gives the same scores")
     require(same_estimates(posterior.estimate(), before), "scoring leaves the posterior as it was")
