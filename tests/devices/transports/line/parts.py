@@ -19,6 +19,8 @@ HASTY = {"timeout_s": 0.2, "connect_s": 1.0}
 
 PAIR = Stimulus(0, 50.0)
 TIMEOUT_S = 0.5
+ENOUGH_S = 5.0
+"""For what comes, however busy the computer is."""
 
 
 def unnumbered(commands: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from benchmarks.faulty_device import check_ledger
 from benchmarks.pulse_peer import Lie, PulsePeer
 
 import isiw
-from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, staged
+from devices.transports.line.parts import ENOUGH_S, HASTY, PAIR, TIMEOUT_S, made, staged
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered
 from isiw.findings import Kind
 from isiw.session.rig import Safeguards
@@ -46,7 +46,7 @@ def test_what_fails_before_firing_gave_nothing_and_the_next_trial_goes_well(
     with pytest.raises(NotDelivered):
         device.deliver(PAIR, TIMEOUT_S)
     assert peer.ledger == []
-    assert isinstance(device.deliver(PAIR, TIMEOUT_S), Measurement)
+    assert isinstance(device.deliver(PAIR, ENOUGH_S), Measurement)
     assert len(peer.ledger) == 1
 
 
@@ -57,7 +57,7 @@ def test_after_a_missing_answer_the_next_trial_begins_over_a_fresh_connection_th
     with pytest.raises(NotDelivered):
         device.deliver(PAIR, TIMEOUT_S)
     so_far = len(peer.heard)
-    device.deliver(PAIR, TIMEOUT_S)
+    device.deliver(PAIR, ENOUGH_S)
     assert [line.split()[1] for line in peer.heard[so_far:]] == ["DISARM", "SET", "GET", "ARM", "FIRE", "RESULT"]
 
 
@@ -80,13 +80,13 @@ def test_the_next_trial_gets_its_own_answer_after_one_that_came_too_late(
     peer.lie("RESULT", Lie.LATE)
     with pytest.raises(DeviceTimeoutError):
         device.deliver(Stimulus(0, 50.0), TIMEOUT_S)
-    assert device.deliver(Stimulus(1, 150.0), TIMEOUT_S) == Measurement(0.025, 150.0)
+    assert device.deliver(Stimulus(1, 150.0), ENOUGH_S) == Measurement(0.025, 150.0)
 
 
 @pytest.mark.parametrize("lie", [Lie.GIVES_ANOTHER, Lie.REPORTS_ANOTHER])
 def test_another_isi_than_the_one_read_back_is_a_mistrial(device: isiw.LineDevice, peer: PulsePeer, lie: Lie) -> None:
     peer.lie("FIRE", lie)
-    answer = device.deliver(PAIR, TIMEOUT_S)
+    answer = device.deliver(PAIR, ENOUGH_S)
     assert isinstance(answer, Measurement)
     assert answer.isi_ms == pytest.approx(90.0)
     assert judge_measurement(answer, PAIR, SPACE).reason is Kind.ISI_OFF
@@ -125,7 +125,7 @@ def test_a_session_that_hears_nothing_after_firing_ends_disarmed_with_an_unknown
 
 def test_what_is_thrown_away_is_said(device: isiw.LineDevice, peer: PulsePeer, warned: io.StringIO) -> None:
     peer.lie("GET", Lie.REPEATS)
-    device.deliver(PAIR, TIMEOUT_S)
+    device.deliver(PAIR, ENOUGH_S)
     assert "thrown away while" in warned.getvalue()
     assert "OK" in warned.getvalue()
 

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.pulse_peer import PEER_COMMANDS, Lie, PulsePeer
 
 import isiw
-from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, over, staged, unnumbered
+from devices.transports.line.parts import ENOUGH_S, HASTY, PAIR, TIMEOUT_S, made, over, staged, unnumbered
 from isiw.devices.transports.line_exchange import Line
 from isiw.devices.transports.line_table import LineExchange
 from isiw.errors import DeviceError, NotDelivered
@@ -119,7 +119,7 @@ def test_without_numbers_a_missing_answer_is_not_taken_from_what_comes_next(peer
         arm_only(device, peer)
         device.stop()
         assert not peer.armed
-        assert isinstance(staged(device).deliver(PAIR, TIMEOUT_S), Measurement)
+        assert isinstance(staged(device).deliver(PAIR, ENOUGH_S), Measurement)
         device.unstage()
 
 
@@ -137,9 +137,9 @@ def test_without_numbers_a_late_answer_is_not_believed_to_be_the_one_to_disarm(p
 
 
 def test_a_connection_that_broke_between_two_trials_is_opened_again(device: isiw.LineDevice, peer: PulsePeer) -> None:
-    device.deliver(PAIR, TIMEOUT_S)
+    device.deliver(PAIR, ENOUGH_S)
     break_connection(device.describe().address)
-    assert isinstance(device.deliver(Stimulus(1, 70.0), TIMEOUT_S), Measurement)
+    assert isinstance(device.deliver(Stimulus(1, 70.0), ENOUGH_S), Measurement)
     assert [fired.trial for fired in peer.ledger] == [0, 1]
 
 
