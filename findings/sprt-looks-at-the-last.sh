@@ -2,7 +2,7 @@
 # sprt decides by the last observation only: a test that ended at the fourth trial is undecided again, and then the opposite.
 #
 # Expected: it calls itself a package for Wald's sequential probability ratio test, which ends at the first observation beyond
-#   a boundary; that is what its error rates are for. Its documentation of values: "observations".
+#   a boundary; that is what its error rates are for.
 # Seen: only the sum of all values is compared with the boundaries. Six responses, then fourteen failures, with 0.3 against 0.7:
 #   the upper boundary is crossed at the fourth trial ("Reject"), ten trials are "Continue" and twenty are "Accept".
 #   (Values are not checked either: the checks of each kind of data are never called, and 2, 3 and 5 pass as yes or no.)

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # tituemg's rectification returns nothing, and its envelope cannot be normalised.
 #
-# Expected: docstring of rec: returns rectified_emg, the rectified signal; of raw_to_env: cvm is an array, the recording of the maximal
-#   voluntary contraction, by whose envelope's maximum the result is stated in per cent.
+# Expected: docstring of rec: returns rectified_emg, the rectified signal; of raw_to_env: cvm (array_like) is the maximal voluntary
+#   contraction, by which the envelope is normalised; normalizacion, beside it, takes its recording or its maximum.
 # Seen: rec computes the signal and returns None. With cvm raw_to_env raises ValueError (the truth value of an array is
-#   asked); a number, which its neighbour normalizacion takes, raises too, as it is rectified and filtered as a signal.
+#   asked); a number raises too, as it is rectified and filtered as a signal.
 # Hurts: the two steps that every analysis of surface EMG has.
 set -euo pipefail
 tmp=$(mktemp -d)
