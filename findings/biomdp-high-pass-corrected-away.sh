@@ -2,7 +2,8 @@
 # biomdp corrects the cut-off of its two-pass high-pass in the direction of a low-pass: 20 Hz are 31 Hz.
 #
 # Expected: docstring of filter_butter: fc is the cut-off frequency. Its code names the correction factor for two passes of Winter
-#   (2009), which keeps the amplitude at the cut-off at 0.71. For a low-pass it raises the frequency of the filter, for a high-pass it lowers it.
+#   (2009), which keeps the amplitude at the cut-off at 0.71: for a low-pass it raises the frequency of the filter, for a
+#   high-pass it lowers it.
 # Seen: it is raised for both. The low-pass at 20 Hz leaves 0.71 at 20 Hz; the high-pass leaves 0.29, and 0.71 at 31 Hz. Without any
 #   correction it would leave 0.50.
 # Hurts: a high-pass against drift or movement artefacts takes much more of slow EMG or force than stated.
