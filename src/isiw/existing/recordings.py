@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from itertools import pairwise
@@ -24,12 +24,14 @@ from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
 from isiw.signals.limits import SignalLimits
+from isiw.signals.watch import shown_by
 from isiw.sweeps import Channel, Sweep
 from isiw.trials import Status, Stimulus, Trial
 from isiw.types import FloatArray
 
 _BEFORE_S, _AFTER_S = 0.15, 0.1  # of a continuous recording, before the longest ISI and after the pulse
 _APART_MS: Final = 2.0  # an ISI in a table that differs by more from that of the events is another one
+_CLEAR, _EDGE, _FEW = 25.0, 0.4, 3  # an MEP so many times the EMG at rest is cut off if it has so much at an edge
 _IF_NONE_COUNTS: Final = (
     "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest without mains "
     "hum, at most {:g} µV RMS? See docs/timing.md."
@@ -56,6 +58,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         raise InvalidValueError(what, remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.")
     limits = SignalLimits() if layout.mep_window_ms is None else SignalLimits(mep_window_ms=layout.mep_window_ms)
     longest_s, trials, sweeps = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0), list[Trial](), {}
+    seen = list[tuple[Sweep, Trial]]()
     bad = contents.events[contents.events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         sweep = _cut(signals, pulse, pulse.at_s - _BEFORE_S - longest_s, key)
@@ -73,11 +76,14 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         begin_s, end_s = min(pulse.at_s - _BEFORE_S, pulse.origin_s or pulse.at_s), pulse.at_s + _AFTER_S
         is_bad = bool(((bad["onset"] <= end_s) & (bad["onset"] + bad["duration"] >= begin_s)).any())
         trials.append(replace(judged, excluded=is_bad or pulse.said.get("excluded") in {True, "true", "True"}))
+        seen += [(sweep, judged)] if trials[-1].told else []
     if trials and not any(trial.told for trial in trials):
         reasons = sorted({str(trial.reason) for trial in trials if trial.reason})
         what = f"no sweep of {source} counts"
         remedy = " ".join([*contents.notes, _IF_NONE_COUNTS.format(limits.background_uv)])
         raise InvalidValueError(what, got=", ".join(reasons) or "excluded ones", remedy=remedy)
+    if layout.mep_window_ms is None and any(trial.isi_ms is not None for trial in trials):
+        _require_within(seen, limits, source)
     emg = [channels["emg"].values for channels in sweeps.values() if "emg" in channels]
     return Delivered(
         renumbered(trials),
@@ -90,6 +96,33 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         unused=unused,
         notes=(*contents.notes, *is_rectified(emg)),
     )
+
+
+def _require_within(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, source: str) -> None:
+    """Raise if most responses are not where MEPs are measured, or go on beyond an edge of it, or if there are none."""
+    first_ms, last_ms = limits.mep_window_ms
+    outside_ms, over_ms, clear, usual = list[float](), list[float](), 0, 0
+    for sweep, trial in seen:
+        shown, emg = shown_by(sweep, trial, limits), sweep.channels["emg"]
+        outside_ms += [] if shown.outside is None else [shown.outside.at_ms]
+        usual += shown.stands_out
+        first, last = (
+            round((at_ms + (sweep.t_tms_ms or 0.0) - emg.t0_ms) * emg.rate_hz / 1e3) for at_ms in (first_ms, last_ms)
+        )
+        within = np.abs(emg.values[max(first, 0) : last + 1] - np.median(emg.values))
+        if shown.mep_mv > _CLEAR * (shown.rest_uv or np.inf) / 1e3:
+            clear += 1
+            over_ms += [
+                at_ms for at_ms, level in ((first_ms, within[0]), (last_ms, within[-1])) if level > _EDGE * within.max()
+            ]
+    odd_ms = outside_ms if 2 * len(outside_ms) > len(seen) else over_ms if 2 * len(over_ms) > clear else []
+    if len(odd_ms) > _FEW or (not usual and len(seen) > _FEW):
+        what = f"most responses in {source} are not within {first_ms:g}–{last_ms:g} ms after the pulse, where MEPs are "
+        got = f"{len(odd_ms)} of {len(seen)}, about {np.median(odd_ms):.0f} ms after it" if odd_ms else "none at all"
+        remedy = (
+            "Does its marker, or time 0, come at the pulse? If it does, write mep_window_ms = [FIRST, LAST], as the "
+        )
+        raise InvalidValueError(f"{what}measured", got=got, remedy=f"{remedy}muscle needs it, into a layout.")
 
 
 def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[str, Track], str]:
