@@ -56,6 +56,15 @@ def test_rows_that_excel_shows_otherwise_than_they_are_read_are_asked_about(
     assert len(read_people(hidden_head, IMPACT)[0].trials) == 36
 
 
+def test_what_merged_cells_say_is_said_of_each_of_their_rows(tmp_path: Path) -> None:
+    path, isis_ms = shown(tmp_path / "P01.xlsx", lambda sheet: sheet.merge_cells("A3:A5")), table()["isi_ms"].tolist()
+    expected = [isis_ms[0], *[isis_ms[1]] * 3, *isis_ms[4:]]
+    assert [trial.isi_ms for trial in read_people(path, IMPACT)[0].trials] == expected
+    path = shown(tmp_path / "P02.xlsx", lambda sheet: sheet.merge_cells("B4:B5"))
+    with pytest.raises(IsiwError, match="one amplitude is merged over several rows; got 'row 4'"):
+        read_people(path, IMPACT)
+
+
 def test_a_unit_beside_numbers_is_theirs_in_a_table_and_in_a_structure_of_matlab(tmp_path: Path) -> None:
     numbers: dict[str, Any] = {"isi": [0.03, 0.06, 0.09], "isi_unit": "s", "mep": [400.0, 900.0, 160.0]}
     scipy.io.savemat(tmp_path / "P01.mat", {"trials": {**numbers, "mep_units": "uV"}})
@@ -105,6 +114,10 @@ def test_a_rate_above_the_samples_or_beside_sweeps_is_compared_with_the_one_that
     sweeps = Layout("impact", rate_hz=2000.0, pulse_at_ms=9.0, units=("mV",), channels={"emg": "emg"})
     with pytest.raises(IsiwError, match=r"'interval' of P01\.mat says"):
         read_people(tmp_path / "P01.mat", sweeps)
+    waves = {name: {"values": trigger(name), "interval": 0.00025} for name in ("tap", "pulse")}
+    scipy.io.savemat(tmp_path / "P02.mat", {"emg": EMG_MV, **waves})
+    with pytest.raises(IsiwError, match=r"'tap\.interval' of P02\.mat says"):
+        read_people(tmp_path / "P02.mat", sweeps)
 
 
 def test_files_of_bids_beside_a_recording_that_contradict_it_are_asked_about(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from isiw.errors import ConfigError, InvalidValueError, LogError
 from isiw.existing.delivered import Delivered, codes_of
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
-from isiw.existing.reading import read_people
+from isiw.existing.reading import people_in
 from isiw.files import folded, hash_of, is_reserved
 from isiw.log.codes import is_same_person, spelling
 from isiw.log.places import log_exists
@@ -97,7 +97,7 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
         what = "the reference of the file is not that of the design space"
         remedy = "ISIs of one cannot be compared with those of the other: correct one of them."
         raise InvalidValueError(what, got=(layout.reference, way.space.reference), remedy=remedy)
-    for delivered in read_people(source, layout, subject=way.subject, limits=way.limits, also=way.also):
+    for delivered in people_in(source, layout, way.subject, way.limits, way.also):
         beside = {name: sha256 for name, sha256 in delivered.files.items() if name != source.name}
         digest = delivered.files.get(source.name) or (hash_of(source) if source.is_file() else "")
         own, simulated = delivered.visit, way.simulated or delivered.simulated

@@ -87,6 +87,7 @@ class Column:
     of: str = "the data"
     factor: float = 1.0  # that turns a number into ms, mV or µV
     of_codes: bool = False  # of people, who may be called NA
+    remedy: str = "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
 
     def number(self, row: int) -> float | None:
         """The number in a row [ms, mV or µV]; None if the cell is empty."""
@@ -95,9 +96,8 @@ class Column:
             return None
         value = _value(cell, self.decimal) if isinstance(cell, str) else _float(cell)
         if not math.isfinite(value):
-            usual = "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
             is_comma = isinstance(cell, str) and "," in cell and self.decimal != ","
-            remedy = "If the comma is a decimal sign, say --decimal ," if is_comma else usual
+            remedy = "If the comma is a decimal sign, say --decimal ," if is_comma else self.remedy
             raise self.refused(row, "is no number", remedy)
         return value if self.factor == 1.0 else value * self.factor
 

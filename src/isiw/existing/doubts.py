@@ -6,9 +6,11 @@ import math
 import re
 import statistics
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import groupby
+from functools import partial
+from itertools import groupby, pairwise
+from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,9 +18,9 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import LONGEST_ISI_MS, Delivered
-from isiw.existing.layout import WORDS, Layout, letters, plain
+from isiw.existing.layout import COLUMNS, WORDS, Layout, letters, plain
 from isiw.findings import AMPLITUDE_MV
-from isiw.lazy import pd
+from isiw.lazy import pd, scipy
 from isiw.text.sanitize import counted
 from isiw.types import FloatArray, Reference
 
@@ -39,7 +41,8 @@ _BASES: Final = "(control|base|baseline|mean|unconditioned|kontrolle)"
 _RELATIVE: Final = re.compile(
     r"%|\bper ?c(ent)?|\bpct\b|pro[zc]ent|p(our|or)cent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|"
     r"\brel(ati\w*)?\b|\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|"
-    r"\bdelta\b|[δΔ]|\bdiff|\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|[/÷] *mep\b|"
+    r"\bdelta\b|\bd mep\b|[δΔ]|\bdiff|\bminus\b|mep +- |\bdb\b|\brank|[\^√]|\bresid|fitted|predict|smooth|winsor|"
+    r"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|[/÷] *mep\b|"
     rf"([/÷]|\b(x|times|div|by|vs)\b) ?{_BASES}\b"
 )
 _MEASURES: Final = (
@@ -50,11 +53,13 @@ _OTHERWISE: Final = (
     ("mep", _RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
     ("mep", _MEASURES, "are of another measure", "amplitudes from peak to peak"),
     ("mep", r"\bgain\b|amplified|verstärk", "are multiplied", "amplitudes at the electrodes"),
-    ("isi", r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe)\b",
+    ("isi", r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe|rank|log\d*|ln|z)\b",
      "are numbers of something", "the intervals themselves, in ms or s"),
 )  # fmt: skip
 """What the name of a column says of its numbers if they are no amplitudes or ISIs, and what is expected."""
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
+_INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
+_OF_FLAGS: Final = {"exclude": "yes", "status": "no"}  # what cells of such a column say of a trial that does not count
 _FEW: Final = 3
 _WORDS: Final = 4  # in a longer remark a word such as bad may be of something else
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
@@ -95,8 +100,9 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
     once = len(rows) > 2 and len({*rows}) == len(rows)
     for name, cells in others.items():
         for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
-            word = odd.strip().rstrip(":").casefold()
-            if word in WORDS["spreads"] | WORDS["sums"] or _MEANS.fullmatch(word):
+            words = [word for word in re.findall(r"[^\W\d_]+", odd.casefold()) if word not in WORDS["beside spreads"]]
+            known = WORDS["spreads"] | WORDS["sums"]
+            if words and ("".join(words) in known or all(one in known or _MEANS.fullmatch(one) for one in words)):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
     title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
@@ -114,19 +120,65 @@ def _is_spread(name: str) -> bool:
     return bool(words) and ({*words} <= WORDS["spreads"] or "".join(words) in WORDS["spreads"])
 
 
-def require_no_verdicts(beside: Iterable[Column]) -> None:
-    """Raise if a column of which nothing is read says that a trial does not count."""
+def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> None:
+    """Raise if a column of which nothing is read says that a trial does not count, in its cells or by its name."""
     for column in beside:
+        if (key := key_of_flags(column.name)) is not None and column.name not in where:
+            texts, out = [*map(str.casefold, column.texts)], _OF_FLAGS[key]
+            blank = {""} if key == "status" and any(texts) else set[str]()
+            odd = [row for row, text in enumerate(texts) if text in WORDS[out] | WORDS["left out"] | blank]
+            if odd and {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}:
+                remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
+                raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
         texts = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
         if (odd := next(filter(_is_verdict, texts), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(odd), "says that the trial does not count", remedy)
 
 
+def key_of_flags(name: str) -> str | None:
+    """What a column would hold whose name has a word of trials that do not count, or of those that do."""
+    words = {*re.findall(r"[^\W\d_]+", _words(name))}
+    kinds = {"exclude": WORDS["left out"] | WORDS["flags"], "status": WORDS["counted"]}
+    return next((key for key, known in kinds.items() if words & (known | {*COLUMNS[key]})), None)
+
+
 def _is_verdict(text: str) -> bool:
     said = text.casefold().partition(":")[0].strip(" !.?#*()[]")
     words = {said, *(re.findall(r"\w+", said) if said.count(" ") < _WORDS else ())}
     return not words.isdisjoint(WORDS["left out"]) and words.isdisjoint(WORDS["no"])
+
+
+def require_no_summaries(columns: Columns, rows: Sequence[int], apart: int | None) -> None:
+    """Raise if rows below the trials are means or SDs of these by their numbers, which no word says.
+
+    They come after an empty row, the last one of which is followed by a row `apart`, or their numbers have more digits
+    than others or are beside the mean of the ISIs; and no column numbers them as trials.
+    """
+    isi, mep = columns["isi"], columns["mep"]
+    known = [row for row in rows if mep.number(row) is not None]
+    meps = np.array([mep.number(row) or 0.0 for row in known])
+    texts = pd.Series([isi.texts[row].replace(isi.decimal, ".") for row in known], dtype=object)
+    isis = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64)
+    digits = [len(mep.text(row).rpartition(mep.decimal)[2]) if mep.decimal in mep.text(row) else 0 for row in known]
+    below = next((n for n, row in enumerate(known) if apart is not None and row >= apart), len(known))
+    for begin in (below, *range(max(len(known) - _FEW, 0), len(known))):
+        if begin < _FEW or columns["order"].text(known[min(begin, len(known) - 1)]):
+            continue
+        agree = [_is_summary(meps[n], digits[n], meps[:begin], meps[:begin][isis[:begin] == isis[n]])
+                 and meps[n] not in meps[:begin] for n in range(begin, len(known))]  # fmt: skip
+        finer = begin < len(known) and digits[begin] > max(digits[:begin])
+        finer |= begin < len(known) and bool(np.isclose(isis[begin], np.nanmean(isis[:begin]), rtol=1e-3))
+        if 2 * sum(agree) > len(agree) and (begin == below or (finer and agree[0])):
+            remedy = "Delete the rows below the trials; if these are trials, number all in a column called trial."
+            raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", remedy)
+
+
+def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
+    """True if a number is, as far as its digits say, a mean or median of others, their SD, or its standard error."""
+    kinds = (np.mean, np.median, np.std, partial(np.std, ddof=1), scipy.stats.sem)
+    slack = max(0.51 * 10.0**-digits, 1e-9 * abs(number))
+    return any(abs(kind(group) - number) <= slack for group in groups if len(group) > 1 for kind in kinds)
 
 
 def require_reference(isi: Column, reference: Reference | None) -> None:
@@ -162,7 +214,7 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 def require_one_kind_each(columns: Columns) -> None:
     """Raise if rows are not of one person's single trials of one muscle, in their order and in one unit."""
     for doubt in (_require_ascending, require_said, _require_one_kind, _require_isis, _require_one_unit,
-                  _require_whole_blocks, _require_one_row_each):  # fmt: skip
+                  _require_one_intensity, _require_whole_blocks, _require_one_row_each):  # fmt: skip
         doubt(columns)
 
 
@@ -183,7 +235,7 @@ def require_codes(columns: Columns) -> None:
 
 def _require_ascending(columns: Columns) -> None:
     """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
-    if (order := columns.of.get("order") or columns.of.get("date")) is None or "block" in columns.of:
+    if (order := columns.of.get("order") or columns.of.get("date")) is None:
         return
     order = replace(order, decimal=columns["isi"].decimal)
     known = {row: text for row in columns.rows if (text := order.text(row))}
@@ -191,17 +243,18 @@ def _require_ascending(columns: Columns) -> None:
     if 0 < len(odd) < len(known):
         raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
     places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
-    if places != sorted(places):
+    pairs = zip(map(columns["block"].text, known), places, strict=False)
+    in_blocks = [[*each] for _, each in groupby(pairs, itemgetter(0))]
+    if any(each != sorted(each) for each in in_blocks):
         what = f"the rows of {order.of} are not in the order of its column {order.name!r}"
         remedy = "Sort them as the trials were delivered, or name the column that says so: --column order=NAME."
         raise InvalidValueError(what, remedy=remedy)
-    times = Counter(places)
-    repeated = next((text for text, place in zip(known.values(), places, strict=False) if times[place] > 1), None)
-    if "order" in columns.of and not odd and repeated is not None:
+    twice = [place for each in in_blocks for (_, before), (_, place) in pairwise(each) if before == place]
+    if "order" in columns.of and not odd and twice:
         what = f"a trial has two rows and more in {order.of}, by its column {order.name!r}"
         remedy = 'Leave one row for each trial, such as that of one muscle: --where "muscle=FCR"; or name a column of '
         remedy += "people or blocks: --column subject=NAME, --column block=NAME."
-        raise InvalidValueError(what, got=repeated, remedy=remedy)
+        raise InvalidValueError(what, got=f"{twice[0]:g}", remedy=remedy)
 
 
 def _is_number(text: str) -> bool:
@@ -217,12 +270,16 @@ def require_said(columns: Columns) -> None:
             remedy = "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it "
             remedy += "is a pair, rename the column."
             raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
+    said = {row: columns["status"].flag(row) for row in columns.rows}
+    if {*said.values()} == {None, True}:
+        row = next(row for row, counts in said.items() if counts is None)
+        raise columns["status"].refused(row, "is empty, and others say yes", "Write yes or no into each row.")
     empty = [row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None]
     empty = [row for row in empty if "mep" not in columns.of or columns["mep"].number(row) is not None]
     if empty and "asked" not in columns.of:
         what = f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}"
         remedy = "If these are TMS alone, say --alone with what stands in their place, or --alone '' for an empty "
-        remedy += "cell; if not, mark them in a column called exclude."
+        remedy += "cell; if not, write their ISIs, or mark them in a column called exclude."
         raise InvalidValueError(what, got=f"row {empty[0] + 1}", remedy=remedy)
 
 
@@ -253,9 +310,15 @@ def _require_one_kind(columns: Columns) -> None:
 def _require_isis(columns: Columns) -> None:
     """Raise if one number among the ISIs is so frequent, or so far from the others, that it may stand for TMS alone."""
     isi, paired = columns["isi"], columns.paired
+    isis_ms = [isi.number(row) for row in paired]
+    before = [isi_ms for isi_ms in isis_ms if (isi_ms or 0.0) < 0]
+    if len({*before}) > 1 and 2 * len(before) > len(paired) > 2 and isi.name not in columns.layout.where:
+        what = f"most ISIs of {isi.of} are below 0, as if the pulse came before the tap"
+        remedy = "If the tap came first, write them without the sign; if not, so that these trials do not count, say "
+        remedy += f'--where "{isi.name}={ALL}".'
+        raise InvalidValueError(what, got=f"{len(before)} of {len(paired)}", remedy=remedy)
     if columns.layout.alone is not None or len(paired) < len(columns.rows):
         return
-    isis_ms = [isi.number(row) for row in paired]
     numbered = any(isis_ms == list(range(first, first + len(paired))) for first in (0, 1))
     if "order" not in columns.of and len(paired) >= _FEWEST and numbered:
         what = f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows"
@@ -272,6 +335,24 @@ def _require_isis(columns: Columns) -> None:
             what = f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone"
             remedy = f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never."
             raise InvalidValueError(what, expected="what an ISI is, and what is TMS alone", remedy=remedy)
+
+
+def _require_one_intensity(columns: Columns) -> None:
+    """Raise if TMS alone had other intensities than pairs by a column that is not used, so that it is no baseline."""
+    paired = {*columns.paired}
+    for name, column in columns.beside.items():
+        if name in columns.layout.where or not _INTENSITY.search(_words(name)):
+            continue
+        texts = {row: column.text(row) for row in columns.rows}
+        of_pairs = dict.fromkeys(text for row, text in texts.items() if row in paired and text)
+        others = dict.fromkeys(text for row, text in texts.items() if row not in paired and text not in {"", *of_pairs})
+        if of_pairs and others:
+            what = f"TMS alone has other intensities than pairs in the column {name!r} of {column.of}, of which nothing"
+            remedy = (
+                f'Say --where "{name}={next(iter(of_pairs))}", or --column intensity=NAME with one in % of the resting '
+            )
+            remedy += f'motor threshold; if all are to be analysed together, say --where "{name}={ALL}".'
+            raise InvalidValueError(f"{what} is read", got=", ".join([*others][:5]), remedy=remedy)
 
 
 def _is_named(columns: Columns, isi_ms: float) -> bool:

@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain, islice, pairwise, zip_longest
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
-from isiw.existing.doubts import doubtful_words
+from isiw.existing.doubts import doubtful_words, key_of_flags
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, WORDS, Layout, letters, unit_named
 from isiw.existing.quantities import require_one, unit_said
 from isiw.lazy import pd, scipy
@@ -79,9 +79,13 @@ def _labelled(path: Path, reader: str) -> pd.DataFrame:
 def named(frame: pd.DataFrame | None) -> pd.DataFrame:
     """A data frame whose index, if it has a name, is a column as others are, and whose columns have one name each."""
     frame = pd.DataFrame() if frame is None else frame
-    if any(name is not None for name in frame.index.names):
+    out_of_order = frame.index.is_unique and not frame.index.is_monotonic_increasing
+    if out_of_order or any(name is not None for name in frame.index.names):
         frame = frame.reset_index()
     names = [" ".join(map(str, name)) if isinstance(name, tuple) else str(name) for name in frame.columns]
+    if any(names[1:]) and letters(names[0]) in {"", "unnamed0"}:  # as R and pandas write the numbers of rows
+        numbers = pd.to_numeric(frame.iloc[:, 0], errors="coerce")
+        names[0] = "index" if numbers.notna().all() and numbers.is_unique else names[0]
     return frame.set_axis(names, axis=1)
 
 
@@ -96,7 +100,10 @@ def _texts(text: str, layout: Layout) -> pd.DataFrame:
     if lines and lines[0].startswith("#"):
         lines = [*_first_part(lines, separator)]
     lines = [line for line in lines if not line.startswith("# ")]
-    table = _table([row for row in _split(lines, separator) if row], layout, title)
+    every_row = [*_split(lines, separator)]
+    table = _table([row for row in every_row if row], layout, title)
+    below = len(every_row) - next((n for n in range(len(every_row), 1, -1) if not every_row[n - 1]), 0)
+    table.attrs["apart"] = len(table) - below if below < len(table) else None
     table.attrs["head"] = "".join(every[: layout.skip_lines + first])
     return table
 
@@ -223,7 +230,8 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         raise InvalidValueError(what, got="; ".join(f"{name} ({cells})" for name, cells in held.items()), remedy=remedy)
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
-    _require_whole(book.book, chosen, heads[chosen])
+    merged = _require_whole(book.book, chosen, heads[chosen])
+    _fill_merged(rows[not layout.names :], merged, heads[chosen], layout.names or [*map(str, rows[0])])
     for cells in islice(book.book[chosen].iter_rows(), _LINES) if rows else ():
         shown = [_shown_in(cell.number_format) if isinstance(cell.value, int | float) else "" for cell in cells]
         if any(shown):  # Excel shows 1.2 as 120 %
@@ -233,8 +241,19 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     return _table(rows, layout, chosen)
 
 
-def _require_whole(book: Any, sheet: str, head: int) -> None:
-    """Raise if Excel shows rows below the head of a sheet otherwise than its cells are read."""
+def _fill_merged(rows: list[list[Any]], merged: Iterable[tuple[int, ...]], head: int, names: Sequence[str]) -> None:
+    """Write what cells below a sheet's head say that are merged over several rows into each of these rows."""
+    for column, first, last_column, last in merged:
+        for place in range(column - 1, last_column if last > first > head else 0):
+            if letters(names[place]) in COLUMNS["mep"]:
+                remedy = "Write an amplitude for each trial."
+                raise InvalidValueError("one amplitude is merged over several rows", got=f"row {first}", remedy=remedy)
+            for row in range(first - head, last - head):
+                rows[row][place] = rows[first - head - 1][place]
+
+
+def _require_whole(book: Any, sheet: str, head: int) -> list[tuple[int, ...]]:
+    """Where cells of a sheet are merged; raise if Excel shows rows below its head otherwise than cells are read."""
     with book[sheet]._get_source() as file:  # noqa: SLF001 - openpyxl does not read it in another way, row by row
         content = file.read()
     notes = (book._archive.read(name) for name in book._archive.namelist() if "comment" in name)  # noqa: SLF001 - the same
@@ -243,11 +262,13 @@ def _require_whole(book: Any, sheet: str, head: int) -> None:
     styles = [str(n) for n, style in enumerate(book._cell_styles) if style.fontId in fonts]  # noqa: SLF001 - the same
     crossed = rf'<c r="[A-Z]+(\d+)" s="(?:{"|".join(styles)})"[^>/]*>' if styles else "(?!)"
     for pattern, are, remedy in (*_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT)):
-        found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
-        if rows := [str(row) for row in found if row > head]:
+        of_rows = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
+        if rows := [str(row) for row in of_rows if row > head]:
             what = f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}"
             got = f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}"
             raise InvalidValueError(what, got=got, remedy=remedy)
+    found = re.findall(rb'<mergeCell ref="([A-Z0-9:]+)"', content)
+    return [library("openpyxl.utils", "import").range_boundaries(each.decode()) for each in found]
 
 
 def _shown_in(number_format: str) -> str:
@@ -291,5 +312,10 @@ def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
         what = "the file has no vectors that could be the columns of a table"
         remedy = "Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
         raise InvalidValueError(what, got=", ".join(arrays) or "nothing that can be read", remedy=remedy)
+    for name, vector in vectors.items():
+        if len(vector) != longest and vector.dtype.kind in "iuf" and np.any(vector > 1) and key_of_flags(name):
+            what = f"the vector {name!r} is not as long as that of the ISIs, as if it had the numbers of some trials"
+            remedy = "Save one in its place that has for each trial 1 if it does not count, and 0 if it does: exclude."
+            raise InvalidValueError(what, got=vector.tolist()[:5], remedy=remedy)
     units = {name: text for name, text in texts.items() if letters(name).endswith(("unit", "units"))}
     return pd.DataFrame({**{name: vector for name, vector in vectors.items() if len(vector) == longest}, **units})

@@ -27,6 +27,8 @@ from isiw.findings import Kind
 from isiw.lazy import pd
 
 _ASKED: Final = frozenset({"isi", "mep", "status", "exclude"})  # of which there may be two, that say different things
+_SAMPLES: Final = 5000  # nobody has so many trials
+_OF_ISIS: Final = "Correct it; if it is TMS alone, say --alone with it; or name another column: --column isi=NAME."
 
 
 @dataclass(frozen=True)
@@ -79,13 +81,7 @@ class Columns:
         """The columns of a table, as they are named or else as they are called."""
         names = [str(name) for name in frame.columns]
         held = {key: _named(key, names, layout, source) for key in COLUMNS if key != "mep" or key in needed}
-        for key, held_ones in (("isi", "ISIs"), ("mep", "amplitudes of the MEPs")):
-            if key in needed and held[key] is None:
-                what = f"no column of {source} is known to hold the {held_ones}"
-                got = ", ".join(name for name in names if name.strip()) or "no names"
-                remedy = f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file '
-                remedy += "(--layout)."
-                raise InvalidValueError(what, got=got, remedy=remedy)
+        _require_held([key for key in needed if held[key] is None], frame, source)
         columns, of_units = dict[str, Column](), set[str]()
         for key, name in held.items():
             if name is not None:
@@ -94,6 +90,7 @@ class Columns:
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
                 of_units |= units.keys()
         columns, stated = _scaled(columns, layout)
+        columns["isi"] = replace(columns["isi"], remedy=_OF_ISIS)
         for key in [key for key in columns if key not in layout.columns and _is_another(key, columns)]:
             held[key] = None
             del columns[key]
@@ -106,7 +103,8 @@ class Columns:
             for place, name in enumerate(names)
             if name not in {*held.values(), *of_units} and name.strip()
         }
-        doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})])
+        doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})],
+                                   layout.where)  # fmt: skip
         doubts.require_reference(columns["isi"], layout.reference)
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = WORDS["alone"] | WORDS["tap alone"]
@@ -115,6 +113,18 @@ class Columns:
                 beside[condition.name] = of_pairs
         empty = Column("", [None] * len(frame), of=source)
         return cls(columns, _chosen([*columns.values(), *beside.values()], layout), layout, stated, beside, empty)
+
+
+def _require_held(missing: Sequence[str], frame: pd.DataFrame, source: str) -> None:
+    """Raise if it is not known which column holds something."""
+    for key in missing:
+        what = f"no column of {source} is known to hold the {'ISIs' if key == 'isi' else 'amplitudes of the MEPs'}"
+        got = ", ".join(str(name) for name in frame.columns if str(name).strip()) or "no names"
+        remedy = f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file (--layout); '
+        remedy += "if each ISI has a column, or each trial, write a row for each trial."
+        if len(frame) > _SAMPLES:
+            remedy = "If these are samples, a row each, say --channel emg=NAME, and write rate_hz into a layout."
+        raise InvalidValueError(what, got=got, remedy=remedy)
 
 
 def _is_another(key: str, columns: Mapping[str, Column]) -> bool:
@@ -182,7 +192,8 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
                if known == first or (key in _ASKED and len({known, first} & WORDS["vague"]) != 1)]  # fmt: skip
     if len(several) > 1:
         what = f"several columns of {source} may hold the {key}"
-        remedy = f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them."
+        alike = "Rename one of them; if they are further trials, write a row for each."
+        remedy = f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else alike
         raise InvalidValueError(what, got=" or ".join(several), remedy=remedy)
     return several[0] if several else None
 

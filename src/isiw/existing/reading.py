@@ -26,6 +26,7 @@ from isiw.existing.quantities import Columns
 from isiw.files import is_mcap
 from isiw.findings import INTENSITY_PCT, Kind
 from isiw.lazy import pd
+from isiw.log.codes import spelling
 from isiw.log.places import log_exists
 from isiw.signals.judgement import judge_measurement
 from isiw.signals.limits import SignalLimits
@@ -63,7 +64,20 @@ def read_people(
         ConfigError: a library is not installed.
         LogError: a log that cannot be read.
     """
-    layout = layout or Layout()
+    codes = dict[str, str]()
+    people = people_in(source, layout or Layout(), subject, limits or ReadingLimits(), also)
+    for code in (one.subject for one in people):
+        if (other := codes.setdefault(spelling(code), code)) != code:
+            what = "two codes differ only in case, spaces, hyphens or underscores"
+            remedy = "For one person write one code everywhere; for two, codes that differ in more."
+            raise InvalidValueError(what, got=f"{other} and {code}", remedy=remedy)
+    return people
+
+
+def people_in(
+    source: str | Path | Any, layout: Layout, subject: str, limits: ReadingLimits, also: Sequence[str | Path]
+) -> list[Delivered]:
+    """The same, also of codes that may be two spellings of one."""
     if not isinstance(source, str | Path):
         return people_of_contents(_in_memory(source), None, layout, subject)
     path = Path(source)
@@ -74,7 +88,7 @@ def read_people(
         return [found]
     if not path.exists():
         raise InvalidValueError("there is no such file", got=str(path), remedy="Check the path.")
-    return read_apart(path, layout, subject, limits or ReadingLimits(), also).people
+    return read_apart(path, layout, subject, limits, also).people
 
 
 def contents_in(path: Path, layout: Layout, limits: ReadingLimits) -> Contents:
@@ -90,6 +104,9 @@ def people_of_contents(
     contents: Contents, path: Path | None, layout: Layout, subject: str, limits: ReadingLimits | None = None
 ) -> list[Delivered]:
     """The people whose trials are in what a file holds; who has no code is called as the file is."""
+    if contents.trials is None and not contents.tracks:
+        remedy = "Do its streams of EMG say their type and rate? Was the EMG recorded?"
+        raise InvalidValueError(f"{contents.source} has no channel of samples", remedy=remedy)
     _require_used(contents, path, layout)
     name = subject or ("" if path is None else path.stem)
     if contents.tracks:
@@ -149,7 +166,9 @@ def _people_of(
     reference = layout.required_reference(source)
     columns = Columns.found(frame, layout, source)
     given = [columns[key].cells for key in ("isi", "mep", "asked")]
-    columns = replace(columns, rows=[n for n in columns.rows if not all(is_missing(cells[n]) for cells in given)])
+    rows = [n for n in columns.rows if not all(is_missing(cells[n]) for cells in given)]
+    after_empty = [after for before, after in pairwise([*rows]) if after - before > 1][-1:]
+    columns = replace(columns, rows=rows)
     if not columns.rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
     doubts.require_codes(columns)
@@ -166,6 +185,7 @@ def _people_of(
         begun = dates[own[0]].isoformat(timespec="microseconds") if own[0] in dates else ""
         given_by = latest_of([columns["date"].text(row) for row in own], [dates.get(row) for row in own])
         found.append(replace(person, visit=replace(person.visit, day=day), created=begun, given_by=given_by))
+    doubts.require_no_summaries(columns, rows, *(after_empty or [frame.attrs.get("apart")]))
     return found
 
 
