@@ -157,7 +157,7 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "blocks with the newest row first": (table(trial=range(36), block=of([1])).iloc[::-1], {}, "its column 'trial'"),
     "a recruitment curve beside pairs": (table(mso=of([55])).assign(isi_ms=np.where(ISIS > 40, ISIS, np.nan),
                                          mso=np.where(ISIS > 40, 55, ISIS.astype(int))), {"alone": ""},
-                                         "TMS alone has other intensities.*'mso'.*got '20, 40'.*--where \"mso=55"),
+                                         "'mso'.*other intensities of TMS alone.*got '20, 40'.*--where \"mso=55"),
     "a column for each ISI": (pd.DataFrame({f"{isi} ms": [0.1, 0.2] for isi in (20, 40)}), {}, "write a row for each"),
     "two columns of what is lost": (table(rejected=of([""]), artefact=of(["", "x"])), {}, "rejected or artefact"),
     "a value that is not there": (long("muscle", ["FCR", "FDI"]), {"where": {"muscle": "APB"}}, "one of FCR, FDI"),
@@ -230,7 +230,7 @@ def test_a_plain_table_is_read_whatever_it_resembles(kind: str, tmp_path: Path) 
 
 
 def test_two_spellings_of_a_code_are_asked_about() -> None:
-    with pytest.raises(IsiwError, match=r"differ only in case.*got 'P07 and p-07'"):
+    with pytest.raises(IsiwError, match=r"p-07 differs .* only in case.*'P07'"):
         read_people(table(subject=of(["P07", "p-07"])), IMPACT)
 
 

@@ -44,6 +44,7 @@ def crossed_out(sheet: Any) -> None:
         (crossed_out, "1 row of the sheet 'Data' is crossed out; got 'row 7'"),
         (lambda sheet: setattr(sheet["A8"], "comment", openpyxl.comments.Comment("Artefakt!", "EK")),
          "1 row of the sheet 'Data' is left out by a note; got 'row 8'"),
+        (lambda sheet: sheet.merge_cells("A4:A6"), "1 row of the sheet 'Data' is merged with others; got 'row 4'"),
         (lambda sheet: sheet.__setitem__("B4", "=1/2"), "1 row .* without the result of a formula; got 'row 4'"),
     ],
 )  # fmt: skip
@@ -54,15 +55,6 @@ def test_rows_that_excel_shows_otherwise_than_they_are_read_are_asked_about(
         read_people(shown(tmp_path / "P01.xlsx", change), IMPACT)
     hidden_head = shown(tmp_path / "P02.xlsx", lambda sheet: setattr(sheet.row_dimensions[1], "hidden", True))
     assert len(read_people(hidden_head, IMPACT)[0].trials) == 36
-
-
-def test_what_merged_cells_say_is_said_of_each_of_their_rows(tmp_path: Path) -> None:
-    path, isis_ms = shown(tmp_path / "P01.xlsx", lambda sheet: sheet.merge_cells("A3:A5")), table()["isi_ms"].tolist()
-    expected = [isis_ms[0], *[isis_ms[1]] * 3, *isis_ms[4:]]
-    assert [trial.isi_ms for trial in read_people(path, IMPACT)[0].trials] == expected
-    path = shown(tmp_path / "P02.xlsx", lambda sheet: sheet.merge_cells("B4:B5"))
-    with pytest.raises(IsiwError, match="one amplitude is merged over several rows; got 'row 4'"):
-        read_people(path, IMPACT)
 
 
 def test_a_unit_beside_numbers_is_theirs_in_a_table_and_in_a_structure_of_matlab(tmp_path: Path) -> None:

@@ -172,7 +172,7 @@ def as_xdf(
         jitter_s: SD of the time of a chunk.
         offset_s: of the clock of the markers.
         codes: whether these are numbers, in a stream of triggers.
-        rate_hz: what the stream of EMG says; without it each sample has a time.
+        rate_hz: what the stream of EMG says.
     """
     (emg_mv, _), rng = recording(), np.random.default_rng(2)
     labels = "<channels><channel><label>FCR</label><unit>microvolts</unit><type>EMG</type></channel></channels>"
@@ -180,8 +180,8 @@ def as_xdf(
     parts.append(header(1, "Amplifier", "EMG", "float32", rate_hz, labels))
     parts.append(header(2, "Box", "TTL", "int16", 0.0) if codes else header(2, "Markers", "Markers", "string", 0.0))
     times_s = 1000.0 + np.arange(len(emg_mv)) / RATE_HZ
-    for first in range(0, len(emg_mv), step := 32 if rate_hz else 1):
-        kept = [n for n in range(first, min(first + step, len(emg_mv))) if not 0 <= times_s[n] - 1003.2 < gap_s]
+    for first in range(0, len(emg_mv), 32):
+        kept = [n for n in range(first, min(first + 32, len(emg_mv))) if not 0 <= times_s[n] - 1003.2 < gap_s]
         if kept:  # the first sample has a time, and the others follow it at the rate of the stream
             late_s = jitter_s * rng.standard_normal()
             values = np.zeros(len(kept) - 1, [("stamp", "u1"), ("value", "<f4")])
@@ -353,7 +353,6 @@ RECORDINGS: Mapping[str, Callable[[Path], Path]] = {
     "XDF": as_xdf,
     "XDF with jitter": lambda path: as_xdf(path, jitter_s=0.004),
     "XDF with two clocks": lambda path: as_xdf(path, offset_s=2.5),
-    "XDF without a rate": lambda path: as_xdf(path, rate_hz=0.0),
     "LabChart": as_labchart,
     "AcqKnowledge": as_acq,
     "AcqKnowledge whose numbers of samples begin below 0": lambda path: as_acq(path, before=34304),

@@ -19,11 +19,8 @@ from isiw.existing.layout import WORDS, plain, unit_named
 from isiw.lazy import pd
 
 _NUMBER: Final = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
-_GROUPED: Final = {
-    ".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),
-    ",": re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?"),
-}
-"""By the decimal sign, numbers whose thousands are grouped by the other sign."""
+_GROUPED: Final = {".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),  # by the other sign than the decimal one
+                   ",": re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?")}  # fmt: skip
 _NUMBER_BEFORE: Final = re.compile(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*")
 _BLANKS: Final = re.compile(r"(?<=\d)[ '’\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}](?=\d{3})")
 _DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")
@@ -130,6 +127,12 @@ class Column:
         what = f"row {row + 1} of the column {self.name!r} of {self.of} {why}"
         return InvalidValueError(what, got=self.cells[row], remedy=remedy)
 
+    def doubted(self, why: str, got: object, remedy: str, expected: str | None = None) -> InvalidValueError:
+        """The error that a column cannot be read."""
+        return InvalidValueError(
+            f"the column {self.name!r} of {self.of} {why}", got=got, expected=expected, remedy=remedy
+        )
+
 
 def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str, Column]:
     """Columns with the decimal sign of each one's texts; one that may also group thousands is asked about."""
@@ -139,9 +142,9 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
     found = {}
     for key, column in columns.items():
         if stated is not None and signs[key] and stated not in signs[key]:
-            what = f"the column {column.name!r} of {column.of} has another decimal sign than the one that is stated"
             expected = f"{''.join(signs[key])!r}, as its numbers have"
-            raise InvalidValueError(what, got=stated, expected=expected, remedy="Leave --decimal out, or correct it.")
+            why, remedy = "has another decimal sign than the one that is stated", "Leave --decimal out, or correct it."
+            raise column.doubted(why, stated, remedy, expected)
         if usual is None and not signs[key] and (doubtful := _doubtful(column)):
             sign = "comma" if "," in doubtful else "point"
             what = f"the {sign} in the column {column.name!r} of {column.of} may be a decimal sign, or group thousands"
@@ -155,9 +158,8 @@ def _signs(column: Column) -> set[str]:
     """The decimal signs that texts of a column have for certain."""
     found = set[str]()
     for text in {cell for cell in column.cells if isinstance(cell, str) and not {*cell}.isdisjoint(".,")}:
-        numbers = {sign: _value(text, sign) for sign in ".,"}
-        found |= {sign for sign, number in numbers.items() if sign in text and not math.isnan(number)
-                  and math.isnan(numbers["," if sign == "." else "."])}  # fmt: skip
+        fitting = {sign for sign in ".," if not math.isnan(_value(text, sign))}
+        found |= fitting & {*text} if len(fitting) == 1 else set()
     return found
 
 

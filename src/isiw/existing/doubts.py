@@ -7,11 +7,12 @@ import re
 import statistics
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from functools import partial
 from itertools import groupby, pairwise
 from operator import itemgetter
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -59,7 +60,6 @@ _OTHERWISE: Final = (
 """What the name of a column says of its numbers if they are no amplitudes or ISIs, and what is expected."""
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
 _INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
-_OF_FLAGS: Final = {"exclude": "yes", "status": "no"}  # what cells of such a column say of a trial that does not count
 _FEW: Final = 3
 _WORDS: Final = 4  # in a longer remark a word such as bad may be of something else
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
@@ -91,7 +91,7 @@ def require_of_kind(key: str, what: str, name: str, source: str) -> None:
 def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source: str) -> None:
     """Raise if rows are means of several trials: their column says so, or their SDs or numbers are beside them."""
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
-    spreads = [name for name in others if _is_spread(name)]
+    spreads = [name for name in others if _says(name, WORDS["spreads"])]
     numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in WORDS["numbers"]}
     whole = {name: all(text.isdigit() and int(text) > 1 for text in texts) for name, texts in numbers.items()}
     counted_in = [name for name, texts in numbers.items() if whole[name] and 2 * len({*texts}) <= len(texts)]
@@ -100,9 +100,7 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
     once = len(rows) > 2 and len({*rows}) == len(rows)
     for name, cells in others.items():
         for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
-            words = [word for word in re.findall(r"[^\W\d_]+", odd.casefold()) if word not in WORDS["beside spreads"]]
-            known = WORDS["spreads"] | WORDS["sums"]
-            if words and ("".join(words) in known or all(one in known or _MEANS.fullmatch(one) for one in words)):
+            if _says(odd, WORDS["spreads"] | WORDS["sums"] | WORDS["means"]) and not _are_initials(odd, cells):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
     title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
@@ -115,25 +113,32 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
         raise InvalidValueError(what, expected=expected, remedy=remedy)
 
 
-def _is_spread(name: str) -> bool:
-    words = [word for word in re.findall(r"\w+", _words(name)) if word not in WORDS["beside spreads"]]
-    return bool(words) and ({*words} <= WORDS["spreads"] or "".join(words) in WORDS["spreads"])
+def _says(text: str, known: AbstractSet[str]) -> bool:
+    """True if a text, besides what stands in brackets, has words of a kind alone, such as SD (mV) or Mean (n = 8)."""
+    bare = re.sub(r"[\[(].*?[\])]|\bn ?= ?\d+", " ", _words(text))
+    words = [word for word in re.findall(r"\w+", bare) if word not in WORDS["beside spreads"]]
+    return bool(words) and ({*words} <= known or "".join(words) in known)
+
+
+def _are_initials(text: str, cells: Sequence[Any]) -> bool:
+    """True if a short text is in rows that follow each other, as a person's code is."""
+    return len(text) < 4 and any(one == other == text for one, other in pairwise(cells))
 
 
 def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> None:
     """Raise if a column of which nothing is read says that a trial does not count, in its cells or by its name."""
     for column in beside:
-        if (key := key_of_flags(column.name)) is not None and column.name not in where:
-            texts, out = [*map(str.casefold, column.texts)], _OF_FLAGS[key]
-            blank = {""} if key == "status" and any(texts) else set[str]()
-            odd = [row for row, text in enumerate(texts) if text in WORDS[out] | WORDS["left out"] | blank]
-            if odd and {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}:
-                remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
-                raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
-        texts = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
-        if (odd := next(filter(_is_verdict, texts), None)) is not None:
+        key, texts = key_of_flags(column.name), [*map(str.casefold, column.texts)]
+        kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
+        odd = [row for row, text in enumerate(texts) if text in kinds]
+        are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
+        if key and column.name not in where and are_flags and 0 < len(odd) < len(texts):
+            remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
+            raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
+        remarks = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
+        if (remark := next(filter(_is_verdict, remarks), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
-            raise column.refused(column.cells.index(odd), "says that the trial does not count", remedy)
+            raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
 
 
 def key_of_flags(name: str) -> str | None:
@@ -157,19 +162,20 @@ def require_no_summaries(columns: Columns, rows: Sequence[int], apart: int | Non
     """
     isi, mep = columns["isi"], columns["mep"]
     known = [row for row in rows if mep.number(row) is not None]
-    meps = np.array([mep.number(row) or 0.0 for row in known])
-    texts = pd.Series([isi.texts[row].replace(isi.decimal, ".") for row in known], dtype=object)
-    isis = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64)
-    digits = [len(mep.text(row).rpartition(mep.decimal)[2]) if mep.decimal in mep.text(row) else 0 for row in known]
+    meps, texts = (
+        np.array([mep.number(row) for row in known]),
+        [isi.texts[row].replace(isi.decimal, ".") for row in known],
+    )
+    isis = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce").to_numpy(dtype=np.float64)
+    digits = [len(mep.text(row).partition(mep.decimal)[2]) for row in known]
     below = next((n for n, row in enumerate(known) if apart is not None and row >= apart), len(known))
-    for begin in (below, *range(max(len(known) - _FEW, 0), len(known))):
-        if begin < _FEW or columns["order"].text(known[min(begin, len(known) - 1)]):
+    for begin in sorted({below, *range(max(len(known) - _FEW, 0), len(known))} - {len(known)}):
+        above, of_isis = meps[:begin], isis[:begin]
+        agree = [_is_summary(meps[n], digits[n], above, above[of_isis == isis[n]]) for n in range(begin, len(known))]
+        if len(above) < _FEW or columns["order"].text(known[begin]) or 2 * sum(agree) <= len(agree):
             continue
-        agree = [_is_summary(meps[n], digits[n], meps[:begin], meps[:begin][isis[:begin] == isis[n]])
-                 and meps[n] not in meps[:begin] for n in range(begin, len(known))]  # fmt: skip
-        finer = begin < len(known) and digits[begin] > max(digits[:begin])
-        finer |= begin < len(known) and bool(np.isclose(isis[begin], np.nanmean(isis[:begin]), rtol=1e-3))
-        if 2 * sum(agree) > len(agree) and (begin == below or (finer and agree[0])):
+        finer = digits[begin] > max(digits[:begin]) or np.isclose(isis[begin], np.nanmean(of_isis), rtol=1e-3)
+        if begin == below or (finer and agree[0]):
             remedy = "Delete the rows below the trials; if these are trials, number all in a column called trial."
             raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", remedy)
 
@@ -177,16 +183,15 @@ def require_no_summaries(columns: Columns, rows: Sequence[int], apart: int | Non
 def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
     """True if a number is, as far as its digits say, a mean or median of others, their SD, or its standard error."""
     kinds = (np.mean, np.median, np.std, partial(np.std, ddof=1), scipy.stats.sem)
-    slack = max(0.51 * 10.0**-digits, 1e-9 * abs(number))
-    return any(abs(kind(group) - number) <= slack for group in groups if len(group) > 1 for kind in kinds)
+    slack, known = max(0.51 * 10.0**-digits, 1e-9 * abs(number)), [group for group in groups if len(group) > 1]
+    return number not in groups[0] and any(abs(kind(group) - number) <= slack for group in known for kind in kinds)
 
 
 def require_reference(isi: Column, reference: Reference | None) -> None:
     """Raise if the name of ISIs says that they count from another event than the one that is stated."""
     if reference is not None and (found := re.search(_ORIGINS[reference], _words(isi.name))):
-        what = f"the column {isi.name!r} of {isi.of} counts from another event than is stated"
         remedy = "Correct --reference, or name the column of the other ISIs: --column isi=NAME."
-        raise InvalidValueError(what, got=reference, expected=f"what {found[0]!r} says", remedy=remedy)
+        raise isi.doubted("counts from another event than is stated", reference, remedy, f"what {found[0]!r} says")
 
 
 def require_short(delivered: Delivered, layout: Layout) -> None:
@@ -214,7 +219,7 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 def require_one_kind_each(columns: Columns) -> None:
     """Raise if rows are not of one person's single trials of one muscle, in their order and in one unit."""
     for doubt in (_require_ascending, require_said, _require_one_kind, _require_isis, _require_one_unit,
-                  _require_one_intensity, _require_whole_blocks, _require_one_row_each):  # fmt: skip
+                  _require_one_intensity, _require_one_row_each):  # fmt: skip
         doubt(columns)
 
 
@@ -234,7 +239,13 @@ def require_codes(columns: Columns) -> None:
 
 
 def _require_ascending(columns: Columns) -> None:
-    """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
+    """Raise if rows are not in the order of delivery, on which drift and the start depend, or a block comes back."""
+    block, seen = columns["block"], set[str]()
+    for text, rows in groupby(columns.rows if block.name not in columns.layout.where else (), block.text):
+        if text and text in seen:
+            remedy = f'If it tells muscles apart, say --where "{block.name}={text}", or --where "{block.name}={ALL}".'
+            raise block.refused(next(rows), "comes back after another block", remedy)
+        seen.add(text)
     if (order := columns.of.get("order") or columns.of.get("date")) is None:
         return
     order = replace(order, decimal=columns["isi"].decimal)
@@ -243,7 +254,7 @@ def _require_ascending(columns: Columns) -> None:
     if 0 < len(odd) < len(known):
         raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
     places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
-    pairs = zip(map(columns["block"].text, known), places, strict=False)
+    pairs = zip(map(block.text, known), places, strict=False)
     in_blocks = [[*each] for _, each in groupby(pairs, itemgetter(0))]
     if any(each != sorted(each) for each in in_blocks):
         what = f"the rows of {order.of} are not in the order of its column {order.name!r}"
@@ -301,10 +312,9 @@ def _require_one_kind(columns: Columns) -> None:
         shares = [len(kinds.keys() & {*each}) / len(kinds) for each in bins]
         if sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins):
             few = ", ".join(list(kinds)[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
-            what = f"the column {name!r} of {isi.of} has several values at each ISI, and nothing is read of it"
             remedy = f'Say --where "{name}={next(iter(kinds))}" for one of them, --where "{name}={ALL}" if all are to '
             remedy += f'be analysed together, or --column "subject={name}" if they are people.'
-            raise InvalidValueError(what, got=few, remedy=remedy)
+            raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
 
 
 def _require_isis(columns: Columns) -> None:
@@ -339,29 +349,25 @@ def _require_isis(columns: Columns) -> None:
 
 def _require_one_intensity(columns: Columns) -> None:
     """Raise if TMS alone had other intensities than pairs by a column that is not used, so that it is no baseline."""
-    paired = {*columns.paired}
     for name, column in columns.beside.items():
-        if name in columns.layout.where or not _INTENSITY.search(_words(name)):
-            continue
         texts = {row: column.text(row) for row in columns.rows}
-        of_pairs = dict.fromkeys(text for row, text in texts.items() if row in paired and text)
-        others = dict.fromkeys(text for row, text in texts.items() if row not in paired and text not in {"", *of_pairs})
-        if of_pairs and others:
-            what = f"TMS alone has other intensities than pairs in the column {name!r} of {column.of}, of which nothing"
+        of_pairs = {texts[row]: None for row in columns.paired if texts[row]}
+        others = dict.fromkeys(text for text in texts.values() if text not in {"", *of_pairs})
+        if name not in columns.layout.where and of_pairs and others and _INTENSITY.search(_words(name)):
             remedy = (
-                f'Say --where "{name}={next(iter(of_pairs))}", or --column intensity=NAME with one in % of the resting '
+                f'Say --where "{name}={next(iter(of_pairs))}", or name a column in % of the resting motor threshold '
             )
-            remedy += f'motor threshold; if all are to be analysed together, say --where "{name}={ALL}".'
-            raise InvalidValueError(f"{what} is read", got=", ".join([*others][:5]), remedy=remedy)
+            remedy += f'by --column intensity=NAME; to analyse all together, say --where "{name}={ALL}".'
+            raise column.doubted("says other intensities of TMS alone than of pairs", ", ".join([*others][:5]), remedy)
 
 
 def _is_named(columns: Columns, isi_ms: float) -> bool:
     """True if a column that is not used has a word for the rows with one ISI that no other row has."""
-    has = {row: columns["isi"].number(row) == isi_ms for row in columns.rows}
+    of_isi = {row for row in columns.rows if columns["isi"].number(row) == isi_ms}
     for column in columns.beside.values():
-        words, others = ({column.text(row) for row in has if has[row] is of_isi} for of_isi in (True, False))
-        if len(words) == 1 and words.isdisjoint(others) and not next(iter(words)).isdigit():
-            return True
+        words = {column.text(row) for row in of_isi}
+        if len(words) == 1 and words.isdisjoint(column.text(row) for row in {*columns.rows} - of_isi):
+            return not next(iter(words)).isdigit()
     return False
 
 
@@ -380,19 +386,8 @@ def _require_one_unit(columns: Columns) -> None:
         if min(len(low), len(high)) < _FEW or not (low[-1] < least or high[0] > most) or high[0] < 8 * low[-1]:
             continue
         if 300 < np.median(high) / np.median(low) < 3000:
-            what = f"the column {column.name!r} of {column.of} seems to be in two units"
             got = f"{len(low)} up to {low[-1] / column.factor:g} and {len(high)} from {high[0] / column.factor:g} on"
-            raise InvalidValueError(what, got=got, remedy="Write all of them in one.")
-
-
-def _require_whole_blocks(columns: Columns) -> None:
-    """Raise if a block comes back after another one, as muscles do."""
-    block, seen = columns["block"], set[str]()
-    for text, rows in groupby(columns.rows if block.name not in columns.layout.where else (), block.text):
-        if text and text in seen:
-            remedy = f'If it tells muscles apart, say --where "{block.name}={text}", or --where "{block.name}={ALL}".'
-            raise block.refused(next(rows), "comes back after another block", remedy)
-        seen.add(text)
+            raise column.doubted("seems to be in two units", got, "Write all of them in one.")
 
 
 def _require_one_row_each(columns: Columns) -> None:

@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain, islice, pairwise, zip_longest
 from pathlib import Path
@@ -39,6 +39,7 @@ _SHOWN_OTHERWISE: Final = (
      "Open the workbook in Excel or LibreOffice, and save it."),
     (rf'(?is)<comment ref="[A-Z]+(\d+)"(?:(?!</comment>).)*?<t[^>]*>\s*(?:{"|".join(WORDS["left out"])})[\s!.]*</t>',
      "left out by a note", _COUNT),
+    (r'<mergeCell ref="[A-Z]+(\d+):[A-Z]+(?!\1")\d+"', "merged with others", "Write into each row what holds for it."),
 )  # fmt: skip
 """In a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do."""
 
@@ -230,8 +231,7 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         raise InvalidValueError(what, got="; ".join(f"{name} ({cells})" for name, cells in held.items()), remedy=remedy)
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
-    merged = _require_whole(book.book, chosen, heads[chosen])
-    _fill_merged(rows[not layout.names :], merged, heads[chosen], layout.names or [*map(str, rows[0])])
+    _require_whole(book.book, chosen, heads[chosen])
     for cells in islice(book.book[chosen].iter_rows(), _LINES) if rows else ():
         shown = [_shown_in(cell.number_format) if isinstance(cell.value, int | float) else "" for cell in cells]
         if any(shown):  # Excel shows 1.2 as 120 %
@@ -241,19 +241,8 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     return _table(rows, layout, chosen)
 
 
-def _fill_merged(rows: list[list[Any]], merged: Iterable[tuple[int, ...]], head: int, names: Sequence[str]) -> None:
-    """Write what cells below a sheet's head say that are merged over several rows into each of these rows."""
-    for column, first, last_column, last in merged:
-        for place in range(column - 1, last_column if last > first > head else 0):
-            if letters(names[place]) in COLUMNS["mep"]:
-                remedy = "Write an amplitude for each trial."
-                raise InvalidValueError("one amplitude is merged over several rows", got=f"row {first}", remedy=remedy)
-            for row in range(first - head, last - head):
-                rows[row][place] = rows[first - head - 1][place]
-
-
-def _require_whole(book: Any, sheet: str, head: int) -> list[tuple[int, ...]]:
-    """Where cells of a sheet are merged; raise if Excel shows rows below its head otherwise than cells are read."""
+def _require_whole(book: Any, sheet: str, head: int) -> None:
+    """Raise if Excel shows rows below the head of a sheet otherwise than its cells are read."""
     with book[sheet]._get_source() as file:  # noqa: SLF001 - openpyxl does not read it in another way, row by row
         content = file.read()
     notes = (book._archive.read(name) for name in book._archive.namelist() if "comment" in name)  # noqa: SLF001 - the same
@@ -262,13 +251,11 @@ def _require_whole(book: Any, sheet: str, head: int) -> list[tuple[int, ...]]:
     styles = [str(n) for n, style in enumerate(book._cell_styles) if style.fontId in fonts]  # noqa: SLF001 - the same
     crossed = rf'<c r="[A-Z]+(\d+)" s="(?:{"|".join(styles)})"[^>/]*>' if styles else "(?!)"
     for pattern, are, remedy in (*_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT)):
-        of_rows = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
-        if rows := [str(row) for row in of_rows if row > head]:
+        found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
+        if rows := [str(row) for row in sorted(found) if row > head]:
             what = f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}"
             got = f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}"
             raise InvalidValueError(what, got=got, remedy=remedy)
-    found = re.findall(rb'<mergeCell ref="([A-Z0-9:]+)"', content)
-    return [library("openpyxl.utils", "import").range_boundaries(each.decode()) for each in found]
 
 
 def _shown_in(number_format: str) -> str:

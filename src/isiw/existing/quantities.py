@@ -236,9 +236,8 @@ def _required_unit(key: str, what: str, column: Column, layout: Layout, known: M
     """The column's unit, as it is stated or as its name says, which must not say that it is something else."""
     doubts.require_of_kind(key, what, column.name, column.of)
     if (other := unit_said(column.name, dict.fromkeys({*UNIT_WORDS.values()} - known.keys(), 1.0))) is not None:
-        what = f"the column {column.name!r} of {column.of} says a unit of no {what}"
         remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."
-        raise InvalidValueError(what, got=other, remedy=remedy)
+        raise column.doubted(f"says a unit of no {what}", other, remedy)
     some = ", ".join(filter(None, column.texts[:5])) or None
     what = f"the {what} of {column.of} in the column {column.name!r}"
     return required_unit(layout, known, unit_said(column.name, known), what, some)

@@ -17,7 +17,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing import doubts, formats, frames, recordings
 from isiw.existing.apart import read_apart
 from isiw.existing.cells import dates_of, is_missing, latest_of
-from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
+from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered, spelt_otherwise
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import CHANNELS, EMG_UNITS, Layout
@@ -26,7 +26,6 @@ from isiw.existing.quantities import Columns
 from isiw.files import is_mcap
 from isiw.findings import INTENSITY_PCT, Kind
 from isiw.lazy import pd
-from isiw.log.codes import spelling
 from isiw.log.places import log_exists
 from isiw.signals.judgement import judge_measurement
 from isiw.signals.limits import SignalLimits
@@ -64,13 +63,9 @@ def read_people(
         ConfigError: a library is not installed.
         LogError: a log that cannot be read.
     """
-    codes = dict[str, str]()
     people = people_in(source, layout or Layout(), subject, limits or ReadingLimits(), also)
-    for code in (one.subject for one in people):
-        if (other := codes.setdefault(spelling(code), code)) != code:
-            what = "two codes differ only in case, spaces, hyphens or underscores"
-            remedy = "For one person write one code everywhere; for two, codes that differ in more."
-            raise InvalidValueError(what, got=f"{other} and {code}", remedy=remedy)
+    for error in spelt_otherwise(one.subject for one in people).values():
+        raise error
     return people
 
 
@@ -105,8 +100,8 @@ def people_of_contents(
 ) -> list[Delivered]:
     """The people whose trials are in what a file holds; who has no code is called as the file is."""
     if contents.trials is None and not contents.tracks:
-        remedy = "Do its streams of EMG say their type and rate? Was the EMG recorded?"
-        raise InvalidValueError(f"{contents.source} has no channel of samples", remedy=remedy)
+        remedy = "Record or export it again so that the stream of EMG, or its channel, says its rate, or as EDF+."
+        raise InvalidValueError(f"{contents.source} has no channel of samples at a rate", remedy=remedy)
     _require_used(contents, path, layout)
     name = subject or ("" if path is None else path.stem)
     if contents.tracks:

@@ -67,9 +67,7 @@ def clocked(
     ahead = np.diff(index)
     steps_s = np.diff(times_s) / ahead
     if len(times_s) < 3 or not np.isfinite(times_s).all() or not np.median(steps_s) > 0:
-        remedy = "Does what recorded it say at which rate? Record or export it again with its rate, or as EDF+."
-        what = f"the times of the samples of {what} do not ascend"
-        raise InvalidValueError(what, got=f"{len(times_s)} samples", remedy=remedy)
+        raise InvalidValueError(f"the times of the samples of {what} do not ascend", got=f"{len(times_s)} samples")
     nominal_s = 1.0 / nominal_hz if nominal_hz else float(np.median(steps_s))
     late_s = times_s - index * nominal_s
     around = max(3, round(_AROUND_S / (nominal_s * float(ahead.mean()))))

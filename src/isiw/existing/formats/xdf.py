@@ -19,7 +19,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from isiw.existing.formats.contents import Contents, Event, Track, clocked, events_of, part_of, text_of
+from isiw.existing.formats.contents import Contents, Event, Track, clocked, events_of, text_of
 from isiw.existing.layout import Layout
 from isiw.opening import opened
 from isiw.text.named_code import library
@@ -29,7 +29,6 @@ BOUNDARY: Final = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
 _HEADER, _SAMPLES, _FOOTER = 2, 3, 6
 _LATE_S: Final = 1e-3
 _MOST: Final = 2**31  # a chunk that is longer [bytes] is damaged
-_OF_SAMPLES: Final = ("emg", "eeg", "exg")  # types of streams that have samples, also if they say no rate
 _OF_MARKERS: Final = ("marker", "trig", "ttl", "stim", "event")
 
 
@@ -49,18 +48,11 @@ def read(path: Path, _layout: Layout) -> Contents:
         if own.has_numbers:
             kept = np.concatenate(own.chunks)[: len(times_s)]  # of which pyxdf left out what came after the end
             own.rows = np.ascontiguousarray(kept.T)
-        if own.has_numbers or own.kind in _OF_SAMPLES:  # at a rate, or in a stream that says none
-            rows_of, samples = (own.rows[0], int(own.rows[1, -1])) if own.has_numbers else (None, 0)
-            rate_hz, stretches, said = clocked(times_s, own.rate_hz, f"the stream {own.name}", rows_of, samples)
+            what, samples = f"the stream {own.name}", int(own.rows[1, -1])
+            rate_hz, stretches, said = clocked(times_s, own.rate_hz, what, own.rows[0], samples)
             notes += said
-            values = (
-                np.empty(0)
-                if own.has_numbers
-                else np.asarray(stream["time_series"], np.float64).reshape(len(times_s), -1)
-            )
-            for n, (label, unit, kind) in enumerate(own.channels()):
-                part = partial(own.read, n) if own.has_numbers else partial(part_of, values[:, n])
-                tracks.append(Track(label, rate_hz, stretches, part, unit, kind))
+            tracks += [Track(label, rate_hz, stretches, partial(own.read, n), unit, kind)
+                       for n, (label, unit, kind) in enumerate(own.channels())]  # fmt: skip
         elif own.form.startswith(("string", "int")) or any(word in own.kind for word in _OF_MARKERS):
             noted = zip(stream["time_series"], times_s.tolist(), strict=True)
             rows += [(text_of(*one), at, 0.0) for one, at in noted]
