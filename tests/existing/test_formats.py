@@ -46,7 +46,7 @@ from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
 
 NAMED = Layout(reference="impact", channels={"emg": "FCR"}, unmarked="alone")
-WORDED = {"XDF", "AcqKnowledge", "LabChart", "Spike2", "NWB"}
+WORDED = {"XDF", "AcqKnowledge", "Spike2", "NWB"}
 """Formats whose files have words that are known, in place of the names of `NAMES`."""
 
 

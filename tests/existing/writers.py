@@ -156,14 +156,9 @@ def header(number: int, name: str, kind: str, form: str, rate_hz: float, channel
 
 
 def as_xdf(
-    path: Path,
-    *,
-    gap_s: float = 0.0,
-    jitter_s: float = 0.0,
-    offset_s: float = 0.0,
-    codes: bool = False,
-    rate_hz: float = RATE_HZ,
-) -> Path:
+    path: Path, *, gap_s: float = 0.0, jitter_s: float = 0.0, offset_s: float = 0.0, codes: bool = False,
+    nominal_hz: float = RATE_HZ,
+) -> Path:  # fmt: skip
     """A stream of EMG in chunks of 32 samples, and one of markers, whose clock is behind by an offset.
 
     Args:
@@ -172,12 +167,12 @@ def as_xdf(
         jitter_s: SD of the time of a chunk.
         offset_s: of the clock of the markers.
         codes: whether these are numbers, in a stream of triggers.
-        rate_hz: what the stream of EMG says.
+        nominal_hz: the rate that the stream of EMG says.
     """
     (emg_mv, _), rng = recording(), np.random.default_rng(2)
     labels = "<channels><channel><label>FCR</label><unit>microvolts</unit><type>EMG</type></channel></channels>"
     parts = [b"XDF:", chunk(1, b"<?xml version='1.0'?><info><version>1.0</version></info>")]
-    parts.append(header(1, "Amplifier", "EMG", "float32", rate_hz, labels))
+    parts.append(header(1, "Amplifier", "EMG", "float32", nominal_hz, labels))
     parts.append(header(2, "Box", "TTL", "int16", 0.0) if codes else header(2, "Markers", "Markers", "string", 0.0))
     times_s = 1000.0 + np.arange(len(emg_mv)) / RATE_HZ
     for first in range(0, len(emg_mv), 32):
@@ -205,20 +200,6 @@ def filled(kind: Any, revision: int = 38, **values: Any) -> bytes:
     for key, value in values.items():
         setattr(held, key, value)
     return bytes(held)
-
-
-def as_labchart(path: Path) -> Path:
-    """Two blocks of whole numbers in MATLAB as LabChart exports them, an empty channel, and comments."""
-    digital, first = np.round(1e4 * recording()[0]).astype("<i2") + 7, 33000  # of the samples are in the first block
-    at = np.array([[1, first + 1], [-1, -1]], float)
-    comments = [[1, *((1, at_s * 4e3) if at_s * 4e3 < first else (2, at_s * 4e3 - first)), 1, 1 + (name == "TMS")]
-                for at_s, name in named_events()]  # fmt: skip
-    ends, each = np.array([[first, len(digital)], [-1, -1]], float), np.ones((2, 2))
-    said = {"titles": ["FCR", "ECG"], "unittext": ["mV", "V "], "comtext": ["tap", "TMS"], "tickrate": [RATE_HZ] * 2}
-    held = {"scaleunits": 1e-4 * each, "scaleoffset": -7 * each, "samplerate": RATE_HZ * each, "unittextmap": each}
-    arrays = {"data": digital, "datastart": at, "dataend": ends, "com": comments, **said, **held}
-    scipy.io.savemat(path / "P01.mat", arrays)
-    return path / "P01.mat"
 
 
 def as_acq(path: Path, *, before: int = 0) -> Path:
@@ -353,7 +334,6 @@ RECORDINGS: Mapping[str, Callable[[Path], Path]] = {
     "XDF": as_xdf,
     "XDF with jitter": lambda path: as_xdf(path, jitter_s=0.004),
     "XDF with two clocks": lambda path: as_xdf(path, offset_s=2.5),
-    "LabChart": as_labchart,
     "AcqKnowledge": as_acq,
     "AcqKnowledge whose numbers of samples begin below 0": lambda path: as_acq(path, before=34304),
     "Spike2": as_smr,

@@ -82,8 +82,7 @@ class Delivered:
             what = f"{self.named} has no pair of stimuli"
             raise InvalidValueError(what, remedy="Which column holds the ISIs, or which marker is of the tap?")
         judged = [trial for trial in self.trials if trial.told or trial.reason is Kind.IMPLAUSIBLE]
-        meps_mv = [trial.mep_mv for trial in judged if trial.mep_mv is not None]
-        self._require_units(isis_ms, meps_mv)
+        self._require_units(isis_ms, [trial.mep_mv for trial in judged if trial.mep_mv is not None])
 
     @property
     def named(self) -> str:

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import groupby, pairwise
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -34,10 +34,11 @@ _MEANS: Final = re.compile(
 )
 _TITLES: Final = re.compile(
     r"\b(means?|averages?|averaged|avg|mittelwerte?|moyennes?|promedios?|medi[ae]|gemiddelden?)\b"
-)
-"""What the names of files and sheets, and titles, say of means."""
-_ORIGINS: Final = {"impact": r"\b(valve|ventil|command)", "valve": r"\b(impact|hit|contact|aufprall)"}
-"""What the name of ISIs that count from another event says."""
+)  # what the names of files and sheets, and titles, say of means
+_ORIGINS: Final = {
+    "impact": r"\b(valve|ventil|command)",
+    "valve": r"\b(impact|hit|contact|aufprall)",
+}  # from another event
 _BASES: Final = "(control|base|baseline|mean|unconditioned|kontrolle)"
 _RELATIVE: Final = re.compile(
     r"%|\bper ?c(ent)?|\bpct\b|pro[zc]ent|p(our|or)cent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|"
@@ -56,11 +57,11 @@ _OTHERWISE: Final = (
     ("mep", r"\bgain\b|amplified|verstärk", "are multiplied", "amplitudes at the electrodes"),
     ("isi", r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe|rank|log\d*|ln|z)\b",
      "are numbers of something", "the intervals themselves, in ms or s"),
-)  # fmt: skip
-"""What the name of a column says of its numbers if they are no amplitudes or ISIs, and what is expected."""
+)  # fmt: skip # what a column's name says of numbers that are no amplitudes or ISIs, and what is expected
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
 _INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
 _FEW: Final = 3
+_CODE: Final = 4  # a shorter text in rows that follow each other may be a person's initials
 _WORDS: Final = 4  # in a longer remark a word such as bad may be of something else
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
 _FEWEST: Final = 12  # in a table with fewer rows ISIs may come again by chance
@@ -70,8 +71,7 @@ _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median
 
 def _words(name: str) -> str:
     """A name in lower case, its words apart; units such as mV are one."""
-    apart = re.sub(r"(?<=[a-z]{2})(?=[A-Z])", " ", name.replace("_", " ")).casefold()
-    return re.sub("mep(?!s)", " mep ", apart)
+    return re.sub("mep(?!s)", " mep ", re.sub(r"(?<=[a-z]{2})(?=[A-Z])", " ", name.replace("_", " ")).casefold())
 
 
 def doubtful_words(text: str) -> list[str]:
@@ -93,14 +93,15 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
     spreads = [name for name in others if _says(name, WORDS["spreads"])]
     numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in WORDS["numbers"]}
-    whole = {name: all(text.isdigit() and int(text) > 1 for text in texts) for name, texts in numbers.items()}
-    counted_in = [name for name, texts in numbers.items() if whole[name] and 2 * len({*texts}) <= len(texts)]
+    counted_in = [name for name, texts in numbers.items() if 2 * len({*texts}) <= len(texts)
+                  and all(text.isdigit() and int(text) > 1 for text in texts)]  # fmt: skip
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
     rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
     once = len(rows) > 2 and len({*rows}) == len(rows)
     for name, cells in others.items():
         for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
-            if _says(odd, WORDS["spreads"] | WORDS["sums"] | WORDS["means"]) and not _are_initials(odd, cells):
+            are_codes = len(odd) < _CODE and any(one == other == odd for one, other in pairwise(cells))
+            if not are_codes and _says(odd, WORDS["spreads"] | WORDS["sums"] | WORDS["means"]):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
     title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
@@ -118,11 +119,6 @@ def _says(text: str, known: AbstractSet[str]) -> bool:
     bare = re.sub(r"[\[(].*?[\])]|\bn ?= ?\d+", " ", _words(text))
     words = [word for word in re.findall(r"\w+", bare) if word not in WORDS["beside spreads"]]
     return bool(words) and ({*words} <= known or "".join(words) in known)
-
-
-def _are_initials(text: str, cells: Sequence[Any]) -> bool:
-    """True if a short text is in rows that follow each other, as a person's code is."""
-    return len(text) < 4 and any(one == other == text for one, other in pairwise(cells))
 
 
 def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> None:
@@ -155,17 +151,11 @@ def _is_verdict(text: str) -> bool:
 
 
 def require_no_summaries(columns: Columns, rows: Sequence[int], apart: int | None) -> None:
-    """Raise if rows below the trials are means or SDs of these by their numbers, which no word says.
-
-    They come after an empty row, the last one of which is followed by a row `apart`, or their numbers have more digits
-    than others or are beside the mean of the ISIs; and no column numbers them as trials.
-    """
+    """Raise if rows from one `apart` on, or with more digits than others, are by their numbers means or SDs."""
     isi, mep = columns["isi"], columns["mep"]
     known = [row for row in rows if mep.number(row) is not None]
-    meps, texts = (
-        np.array([mep.number(row) for row in known]),
-        [isi.texts[row].replace(isi.decimal, ".") for row in known],
-    )
+    meps = np.array([mep.number(row) for row in known])
+    texts = [isi.texts[row].replace(isi.decimal, ".") for row in known]
     isis = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce").to_numpy(dtype=np.float64)
     digits = [len(mep.text(row).partition(mep.decimal)[2]) for row in known]
     below = next((n for n, row in enumerate(known) if apart is not None and row >= apart), len(known))
@@ -198,11 +188,13 @@ def require_short(delivered: Delivered, layout: Layout) -> None:
     """Raise if most ISIs are longer than those after which the effect of a tap is sought."""
     usual_ms = statistics.median(trial.isi_ms for trial in delivered.trials if trial.isi_ms is not None)
     if usual_ms > layout.longest_isi_ms:
-        what, got = f"the ISIs of {delivered.source} are longer than those of paired stimulation", f"{usual_ms:g} ms"
-        remedy = "Are they in another unit (--unit), or numbers of samples, or times between trials? If they are "
-        remedy += "right, write longest_isi_ms = NUMBER into a layout."
-        expected = f"at most {layout.longest_isi_ms:g} ms"
-        raise InvalidValueError(what, got=f"{got} in the median", expected=expected, remedy=remedy)
+        what = f"the ISIs of {delivered.source} are longer than those of paired stimulation"
+        remedy = (
+            "Are they in another unit (--unit), or numbers of samples, or times between trials? If they are right, "
+        )
+        got, expected = f"{usual_ms:g} ms in the median", f"at most {layout.longest_isi_ms:g} ms"
+        remedy += "write longest_isi_ms = NUMBER into a layout."
+        raise InvalidValueError(what, got=got, expected=expected, remedy=remedy)
 
 
 def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
@@ -233,9 +225,8 @@ def require_codes(columns: Columns) -> None:
         if text.upper() == "NA" and others and not initials:
             remedy = "If NA is a person's code, write another one, such as N.A.; if the code is missing, fill it in."
             raise subject.refused(row, "may be a code, or stand for none", remedy)
-    if any(texts.values()) and "" in texts.values():
-        row = next(row for row, text in texts.items() if not text)
-        raise subject.refused(row, "is empty", "Write the person's code into each row.")
+    if empty := [row for row, text in texts.items() if not text and any(texts.values())]:
+        raise subject.refused(empty[0], "is empty", "Write the person's code into each row.")
 
 
 def _require_ascending(columns: Columns) -> None:
@@ -263,8 +254,8 @@ def _require_ascending(columns: Columns) -> None:
     twice = [place for each in in_blocks for (_, before), (_, place) in pairwise(each) if before == place]
     if "order" in columns.of and not odd and twice:
         what = f"a trial has two rows and more in {order.of}, by its column {order.name!r}"
-        remedy = 'Leave one row for each trial, such as that of one muscle: --where "muscle=FCR"; or name a column of '
-        remedy += "people or blocks: --column subject=NAME, --column block=NAME."
+        remedy = 'Leave one row for each trial, such as that of a muscle: --where "muscle=FCR"; or say --column '
+        remedy += "subject=NAME of people, or --column block=NAME of blocks."
         raise InvalidValueError(what, got=f"{twice[0]:g}", remedy=remedy)
 
 
@@ -278,12 +269,11 @@ def require_said(columns: Columns) -> None:
     one_word = len({*map(plain, map(condition.text, columns.rows))}) == 1  # in all rows it means nothing
     for row in paired if columns.layout.alone is None else ():
         if (by := columns.called_alone(row)) is not None and not (by is condition and one_word):
-            remedy = "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it "
-            remedy += "is a pair, rename the column."
+            remedy = "If it is TMS alone, leave its ISI empty, or say --alone with it; if a pair, rename the column."
             raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
-    said = {row: columns["status"].flag(row) for row in columns.rows}
-    if {*said.values()} == {None, True}:
-        row = next(row for row, counts in said.items() if counts is None)
+    said = [columns["status"].flag(row) for row in columns.rows]
+    if {*said} == {None, True}:
+        row = columns.rows[said.index(None)]
         raise columns["status"].refused(row, "is empty, and others say yes", "Write yes or no into each row.")
     empty = [row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None]
     empty = [row for row in empty if "mep" not in columns.of or columns["mep"].number(row) is not None]
@@ -332,8 +322,7 @@ def _require_isis(columns: Columns) -> None:
     numbered = any(isis_ms == list(range(first, first + len(paired))) for first in (0, 1))
     if "order" not in columns.of and len(paired) >= _FEWEST and numbered:
         what = f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows"
-        remedy = "Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called "
-        remedy += "trial."
+        remedy = "Name that of the ISIs: --column isi=NAME; if these are, number the rows in a column called trial."
         raise InvalidValueError(what, remedy=remedy)
     times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
     for odd in {min(times, default=0.0), max(times, default=0.0)}:
@@ -404,8 +393,6 @@ def _require_one_row_each(columns: Columns) -> None:
     times_of_four = Counter(rows for rows in four if len({mep for _, mep in rows}) == 4)
     again |= max(times_of_four.values(), default=0) > 1  # nor four trials in a row
     if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
-        what = f"the ISIs of {isi.of} come {max(times, 2)} times each, as if there was a row for each of several "
-        what += "muscles, or each row twice"
+        what = f"the ISIs of {isi.of} come {max(times, 2)} times each, as if muscles had a row each, or each row twice"
         remedy = "Leave one row for each trial; if each row is one, number them in a column called trial."
-        got = ", ".join(texts[: 2 * max(times, 2)])
-        raise InvalidValueError(what, got=got, remedy=remedy)
+        raise InvalidValueError(what, got=", ".join(texts[: 2 * max(times, 2)]), remedy=remedy)

@@ -40,8 +40,7 @@ _SHOWN_OTHERWISE: Final = (
     (rf'(?is)<comment ref="[A-Z]+(\d+)"(?:(?!</comment>).)*?<t[^>]*>\s*(?:{"|".join(WORDS["left out"])})[\s!.]*</t>',
      "left out by a note", _COUNT),
     (r'<mergeCell ref="[A-Z]+(\d+):[A-Z]+(?!\1")\d+"', "merged with others", "Write into each row what holds for it."),
-)  # fmt: skip
-"""In a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do."""
+)  # fmt: skip # in a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do
 
 
 def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
@@ -130,8 +129,7 @@ def _first(lines: Sequence[str], layout: Layout) -> int:
         separator = layout.separator or _separator(line.lstrip("# "))
         names, *below = _split([line.lstrip("# "), *lines[number + 1 : number + 3]], separator)
         if _is_header(names, layout):
-            whole = all(len(row) >= len(names) for row in below if row)
-            found.append((not whole, separator == _BLANKS, number))
+            found.append((not all(len(row) >= len(names) for row in below if row), separator == _BLANKS, number))
     best = min(found, default=(True, True, 0))[-1]
     return next((number for number, line in enumerate(lines) if line == lines[best]), 0)  # where the names come first
 
@@ -165,10 +163,12 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     for number, row in enumerate(body, 1):
         if not all(is_missing(cell) for cell in row[len(names) :]):
             what = f"row {number} has {len(row)} cells, but there are {len(names)} names: no table that can be read"
-            remedy = "Is a decimal comma also what separates the cells? Save the file with another separator."
+            remedy = (
+                "Is a decimal comma also what separates the cells? Save the file with another separator. If these are "
+            )
+            remedy += "samples, describe lines and columns in a layout, as docs/your-data.md does (--layout)."
             raise InvalidValueError(what, got=" | ".join(map(str, row[: len(names) + 2])), remedy=remedy)
-    cells = [[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body]
-    table = pd.DataFrame(cells, columns=names)
+    table = pd.DataFrame([[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body], columns=names)
     table.attrs["title"] = title
     return table
 
@@ -191,7 +191,6 @@ def decoded(content: bytes) -> str:
 
 
 def _separator(line: str) -> str:
-    """The separator of the columns' names; blanks, if there is no other."""
     counts = {sign: line.count(sign) for sign in ("\t", ";", ",", "|")}
     best = max(counts, key=lambda sign: counts[sign])
     return best if counts[best] else _BLANKS
@@ -290,6 +289,9 @@ def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
 
 def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
     """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
+    if {"data", "datastart", "dataend", "titles"} <= arrays.keys():
+        remedy = "In LabChart: File, Export, LabChart text (.txt), and a layout: docs/your-data.md."
+        raise InvalidValueError("this has LabChart's channels one behind the other", got="data", remedy=remedy)
     squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
     vectors = {name: array for name, array in squeezed.items() if array.ndim == 1}
     texts = {name: str(array.item()) for name, array in arrays.items() if array.size == 1 and array.dtype.kind in "UO"}

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import glob
-import math
 import os
 import re
-import time
 import zipfile
 from dataclasses import dataclass, fields, replace
 from itertools import islice
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Final, Literal
 
 from isiw.checks import Checked, Count, Positive, number
 from isiw.errors import InvalidValueError
@@ -149,18 +147,9 @@ def require_most(source: str, *counts: tuple[str, float, float, str]) -> None:
             raise passed(source, what, f"{got:.0f}{unit}" if unit else got, most, unit)
 
 
-def limit_memory(memory_mb: float) -> None:
-    """Limit the memory that this process may take [MB], where the system can: Linux counts all of it, Windows none."""
-    _limit("DATA", 1e6 * memory_mb)
-
-
-def limit_time(seconds: float) -> None:
-    """Limit the processor time that this process may take from now on [s], where the system can."""
-    _limit("CPU", math.ceil(time.process_time() + seconds))
-
-
-def _limit(what: str, most: float) -> None:
+def limit(kind: Literal["DATA", "CPU"], most: float) -> None:
+    """Limit the memory of this process [bytes], which Linux counts, or its processor time [s], but not on Windows."""
     if resource is not None:
-        kind = getattr(resource, f"RLIMIT_{what}")
-        _, hard = resource.getrlimit(kind)
-        resource.setrlimit(kind, (int(most if hard < 0 else min(most, hard)), hard))
+        limited = getattr(resource, f"RLIMIT_{kind}")
+        _, hard = resource.getrlimit(limited)
+        resource.setrlimit(limited, (int(most if hard < 0 else min(most, hard)), hard))

@@ -54,7 +54,6 @@ def names_of(events: pd.DataFrame) -> list[str]:
 
 
 def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
-    """The names of the events that mark something."""
     if key in layout.channels:
         return [key]
     names = names_of(events)
@@ -119,9 +118,9 @@ def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout
         came_s = None if pulse.origin_s is None else round(pulse.origin_s, 9)
         shared = came_s is not None and came_s == last_came_s
         if taps > 1 or shared:
-            what = f"two pulses of {source} have one tap"
-            if not shared:
-                what = f"{taps} taps of {source} come before one pulse"
+            what = (
+                f"two pulses of {source} have one tap" if shared else f"{taps} taps of {source} come before one pulse"
+            )
             expected = f"one of each within {layout.longest_isi_ms:g} ms"
             remedy = "Leave out the events that mark no stimulus, such as a second edge, or give them another name."
             raise InvalidValueError(what, got=f"at {pulse.at_s:.3f} s", expected=expected, remedy=remedy)

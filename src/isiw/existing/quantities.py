@@ -11,23 +11,11 @@ from typing import Any, Final
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing import doubts
 from isiw.existing.cells import Column, says_alone, with_decimals, without_unit_in_cells
-from isiw.existing.layout import (
-    COLUMNS,
-    EMG_UNITS,
-    ISI_UNITS_MS,
-    UNIT_WORDS,
-    WORDS,
-    Layout,
-    letters,
-    plain,
-    required_unit,
-    unit_named,
-)
+from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, WORDS, Layout, letters, plain, unit_named
 from isiw.findings import Kind
 from isiw.lazy import pd
 
 _ASKED: Final = frozenset({"isi", "mep", "status", "exclude"})  # of which there may be two, that say different things
-_SAMPLES: Final = 5000  # nobody has so many trials
 _OF_ISIS: Final = "Correct it; if it is TMS alone, say --alone with it; or name another column: --column isi=NAME."
 
 
@@ -98,11 +86,9 @@ class Columns:
             columns["subject"] = replace(columns["subject"], of_codes=True)
         if "mep" in columns:
             doubts.require_single_trials(columns["mep"], columns["isi"], frame, source)
-        beside = {
-            name: Column(name, frame.iloc[:, place].tolist(), of=source)
-            for place, name in enumerate(names)
-            if name not in {*held.values(), *of_units} and name.strip()
-        }
+        used = {*held.values(), *of_units}
+        beside = {name: Column(name, frame.iloc[:, place].tolist(), of=source)
+                  for place, name in enumerate(names) if name not in used and name.strip()}  # fmt: skip
         doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})],
                                    layout.where)  # fmt: skip
         doubts.require_reference(columns["isi"], layout.reference)
@@ -116,27 +102,25 @@ class Columns:
 
 
 def _require_held(missing: Sequence[str], frame: pd.DataFrame, source: str) -> None:
-    """Raise if it is not known which column holds something."""
     for key in missing:
         what = f"no column of {source} is known to hold the {'ISIs' if key == 'isi' else 'amplitudes of the MEPs'}"
         got = ", ".join(str(name) for name in frame.columns if str(name).strip()) or "no names"
         remedy = f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file (--layout); '
         remedy += "if each ISI has a column, or each trial, write a row for each trial."
-        if len(frame) > _SAMPLES:
+        if len(frame) > 5000:  # so many trials has nobody
             remedy = "If these are samples, a row each, say --channel emg=NAME, and write rate_hz into a layout."
         raise InvalidValueError(what, got=got, remedy=remedy)
 
 
 def _is_another(key: str, columns: Mapping[str, Column]) -> bool:
     """True if a column is of no use as what its name says: an id of each row, reasons of nothing, or amplitudes."""
-    texts = columns[key].texts if key in {"subject", "tms_alone"} else []
+    texts = columns[key].texts if key in {"subject", "tms_alone", "order"} else []
     if key == "subject":
         return letters(columns[key].name) == "id" and 1 < len(texts) == len({*texts})
     if key == "tms_alone":
         return not {*map(str.casefold, texts)} <= {"", *WORDS["yes"], *WORDS["no"]}
-    if key == "order":  # such as before and after
-        return not any(re.search(r"\d", text) for text in columns[key].texts)
-    return key == "reason" and not {"status", "exclude"} & columns.keys()
+    said = re.search(r"\d", "".join(texts)) if key == "order" else {"status", "exclude"} & columns.keys()
+    return key in {"order", "reason"} and not said  # such as before and after
 
 
 def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:
@@ -240,4 +224,4 @@ def _required_unit(key: str, what: str, column: Column, layout: Layout, known: M
         raise column.doubted(f"says a unit of no {what}", other, remedy)
     some = ", ".join(filter(None, column.texts[:5])) or None
     what = f"the {what} of {column.of} in the column {column.name!r}"
-    return required_unit(layout, known, unit_said(column.name, known), what, some)
+    return layout.required_unit(known, unit_said(column.name, known), what, some)

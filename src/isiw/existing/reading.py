@@ -143,21 +143,18 @@ def _require_use(layout: Layout, used: Mapping[str, AbstractSet[str] | None], so
 
 
 def _in_memory(source: Any) -> Contents:
-    """What a table holds, or a recording that MNE has read."""
     if isinstance(source, pd.DataFrame):
         return Contents("the table", trials=source)
     if hasattr(source, "metadata") and hasattr(source, "get_data"):
         return mne_files.of_epochs(source)
     if hasattr(source, "annotations"):
         return mne_files.of_raw(source)
-    expected = "a path, a DataFrame, or mne.Epochs or Raw"
-    raise InvalidValueError("this holds no trials", got=source, expected=expected)
+    raise InvalidValueError("this holds no trials", got=source, expected="a path, a DataFrame, or mne.Epochs or Raw")
 
 
 def _people_of(
     frame: pd.DataFrame, layout: Layout, source: str, name: str, limits: ReadingLimits | None
 ) -> list[Delivered]:
-    """The people of a table, in the order in which they come first."""
     reference = layout.required_reference(source)
     columns = Columns.found(frame, layout, source)
     given = [columns[key].cells for key in ("isi", "mep", "asked")]
@@ -185,7 +182,6 @@ def _people_of(
 
 
 def _by_text(texts: Iterable[str], rows: Iterable[int]) -> dict[str, list[int]]:
-    """Rows by the texts that they have."""
     found: dict[str, list[int]] = {}
     for text, row in zip(texts, rows, strict=True):
         found.setdefault(text, []).append(row)
@@ -255,20 +251,19 @@ def _trial(columns: Columns, row: int, number: int, space: DesignSpace, signals:
 
 def _with_intensities(trials: Sequence[Trial], columns: Columns) -> tuple[list[Trial], float | None]:
     """Trials of TMS alone with their intensities [% RMT], and that of all pairs; None where none is stated."""
+    name, own, paired = columns["intensity"].name, list[Trial](), dict[float | None, str]()
     stated = [columns["intensity"].number(row) for row in columns.rows]
-    for row, pct_rmt in zip(columns.rows, stated, strict=True):
+    for row, pct_rmt, trial in zip(columns.rows, stated, trials, strict=True):
         if pct_rmt is not None and not INTENSITY_PCT.least <= pct_rmt <= _STRONGEST_PCT_RMT:
             remedy = "It must be in % of the resting motor threshold."
             raise columns.of["intensity"].refused(row, "is no intensity in % RMT", remedy)
-    paired = {pct_rmt for trial, pct_rmt in zip(trials, stated, strict=True) if trial.wanted_isi_ms is not None}
-    rows = zip(columns.rows, trials, stated, strict=True)
-    name, texts = columns["intensity"].name, {pct_rmt: columns["intensity"].text(row) for row, trial, pct_rmt in rows
-                                              if trial.wanted_isi_ms is not None and pct_rmt}  # fmt: skip
-    if len(texts) > 1 and name not in columns.layout.where:
-        what, got = f"the pairs of {columns['isi'].of} have several intensities", ", ".join(texts.values())
-        remedy = f'Say --where "{name}={next(iter(texts.values()))}" for one of them, or --where "{name}={doubts.ALL}" '
+        if trial.wanted_isi_ms is not None:
+            paired[pct_rmt] = columns["intensity"].text(row)
+    if len(texts := [text for text in paired.values() if text]) > 1 and name not in columns.layout.where:
+        what, got = f"the pairs of {columns['isi'].of} have several intensities", ", ".join(texts)
+        remedy = f'Say --where "{name}={texts[0]}" for one of them, or --where "{name}={doubts.ALL}" '
         raise InvalidValueError(what, got=f"{got} % RMT", remedy=f"{remedy}if all are to be analysed together.")
-    usual, own = paired.pop() if len(paired) == 1 else None, list[Trial]()
+    usual = next(iter(paired)) if len(paired) == 1 else None
     for trial, pct_rmt in zip(trials, stated, strict=True):
         of_alone = trial.wanted_isi_ms is None and not trial.tap_alone and pct_rmt != usual
         own.append(replace(trial, intensity_pct_rmt=pct_rmt) if of_alone else trial)

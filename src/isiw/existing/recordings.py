@@ -17,7 +17,7 @@ from isiw.existing.doubts import is_rectified, require_said
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
-from isiw.existing.layout import EMG_UNITS, MARKERS, Layout, required_unit, unit_named
+from isiw.existing.layout import EMG_UNITS, MARKERS, Layout, unit_named
 from isiw.existing.markers import Pulse, marked, names_of, pulses_of
 from isiw.existing.quantities import Columns, isis_of, require_one, unit_said
 from isiw.findings import Kind
@@ -40,8 +40,7 @@ OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
     "columns": {"isi", "status", "exclude", "reason", "tap_alone", "tms_alone", "subject", "day", "condition"},
     "channels": {"emg", "tap", "valve"},
     "markers": {"pulse", "tap", "valve"},
-}
-"""What columns, channels and markers can hold that is used of sweeps whose ISIs are stated."""
+}  # what columns, channels and markers can hold that is used of sweeps whose ISIs are stated
 
 
 def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
@@ -71,8 +70,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
             continue
         asked_ms: Any = pulse.said.get("commanded_isi_ms")  # what the file says, or else what the events do
         asked_ms = max(1e3 * (pulse.isi_s or 0.0), 0.0) if is_missing(asked_ms) else float(asked_ms)
-        stimulus = Stimulus(number, None if pulse.isi_s is None else asked_ms)
-        judged = judge(sweep, stimulus, anywhere(reference), limits)
+        judged = judge(sweep, Stimulus(number, None if pulse.isi_s is None else asked_ms), anywhere(reference), limits)
         begin_s, end_s = min(pulse.at_s - _BEFORE_S, pulse.origin_s or pulse.at_s), pulse.at_s + _AFTER_S
         is_bad = bool(((bad["onset"] <= end_s) & (bad["onset"] + bad["duration"] >= begin_s)).any())
         trials.append(replace(judged, excluded=is_bad or pulse.said.get("excluded") in {True, "true", "True"}))
@@ -100,23 +98,19 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
 
 def _require_within(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, source: str) -> None:
     """Raise if most responses are not where MEPs are measured, or go on beyond an edge of it, or if there are none."""
-    first_ms, last_ms = limits.mep_window_ms
-    outside_ms, over_ms, clear, usual = list[float](), list[float](), 0, 0
+    (first_ms, last_ms), responses_ms, usual = limits.mep_window_ms, list[float | None](), False
     for sweep, trial in seen:
         shown, emg = shown_by(sweep, trial, limits), sweep.channels["emg"]
-        outside_ms += [] if shown.outside is None else [shown.outside.at_ms]
-        usual += shown.stands_out
-        first, last = (
-            round((at_ms + (sweep.t_tms_ms or 0.0) - emg.t0_ms) * emg.rate_hz / 1e3) for at_ms in (first_ms, last_ms)
-        )
-        within = np.abs(emg.values[max(first, 0) : last + 1] - np.median(emg.values))
-        if shown.mep_mv > _CLEAR * (shown.rest_uv or np.inf) / 1e3:
-            clear += 1
-            over_ms += [
-                at_ms for at_ms, level in ((first_ms, within[0]), (last_ms, within[-1])) if level > _EDGE * within.max()
-            ]
-    odd_ms = outside_ms if 2 * len(outside_ms) > len(seen) else over_ms if 2 * len(over_ms) > clear else []
-    if len(odd_ms) > _FEW or (not usual and len(seen) > _FEW):
+        since_ms = np.arange(len(emg.values)) * (1e3 / emg.rate_hz) + emg.t0_ms - (sweep.t_tms_ms or 0.0)
+        within = np.abs(emg.values - np.median(emg.values))[(since_ms >= first_ms) & (since_ms <= last_ms)]
+        if shown.outside is not None:
+            responses_ms.append(shown.outside.at_ms)
+        elif shown.mep_mv > _CLEAR * (shown.rest_uv or np.inf) / 1e3:
+            edges = zip((first_ms, last_ms, None), (*(within[[0, -1]] > _EDGE * within.max()), True), strict=True)
+            responses_ms.append(next(at_ms for at_ms, is_large in edges if is_large))
+        usual |= shown.stands_out
+    odd_ms = [at_ms for at_ms in responses_ms if at_ms is not None]
+    if len(seen) > _FEW and (not usual or (2 * len(odd_ms) > len(responses_ms) and 4 * len(odd_ms) > len(seen))):
         what = f"most responses in {source} are not within {first_ms:g}–{last_ms:g} ms after the pulse, where MEPs are "
         got = f"{len(odd_ms)} of {len(seen)}, about {np.median(odd_ms):.0f} ms after it" if odd_ms else "none at all"
         remedy = (
@@ -135,8 +129,7 @@ def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[st
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
     emg = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
     known, notes = unit_named(emg.unit), contents.notes
-    what = f"the channel {emg.name!r} of {contents.source}"
-    unit = required_unit(layout, EMG_UNITS, known, what, emg.unit or None)
+    unit = layout.required_unit(EMG_UNITS, known, f"the channel {emg.name!r} of {contents.source}", emg.unit or None)
     if known not in {None, unit}:
         notes = (*notes, f"{contents.source} says {emg.unit}, and {unit} is used, as stated.")
     signals = {key: track for key, track in tracks.items() if key not in MARKERS}
@@ -179,8 +172,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
         at_s = sweep.start_s + (contents.pulse_at_s or 0.0) + ((isi_s or 0.0) if at_tap else 0.0)
         span_s = sweep.start_s, sweep.start_s + sweep.samples / emg.rate_hz
         lost = layout.unmarked == "lost" and not columns["isi"].text(row)
-        said = {"excluded": columns.lost(row) is not None}
-        pulses.append(Pulse(at_s, isi_s, lost=lost, sweep_s=span_s, said=said))
+        pulses.append(Pulse(at_s, isi_s, lost=lost, sweep_s=span_s, said={"excluded": columns.lost(row) is not None}))
     return pulses, tuple(columns.beside), _only_one(columns)
 
 

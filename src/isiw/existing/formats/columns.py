@@ -22,14 +22,13 @@ from isiw.types import FloatArray
 _PERIOD: Final = re.compile(r"(?i)(?=interval\W|[\d.]+\s*\w+/sample)(?:interval\W+)?(\d[\d.e-]*)\s*([a-zµ]+)")
 _RATE: Final = re.compile(r"(?:rate|sampl|frequency)[^\n\d]*(\d[\d.]*)\s*(k?)Hz", re.IGNORECASE)
 """What the lines above samples say of the time between them, or of their rate."""
-_HEAD: Final = 4000  # so much of a text may be above samples
 _FEW: Final = 0.01  # with a larger share of steps that are longer than usual, times have no pauses but are rounded
 _OF_LAYOUT: Final = "Correct rate_hz in the layout; what has another rate must be a file of its own."
 
 
 def read(path: Path, layout: Layout) -> Contents:
     """A table, or the channels and events of a recording whose layout names the column of the EMG."""
-    frame, source = _frame(path, layout), path.name
+    frame, source = frames.read_frame(path, layout), path.name
     if "emg" not in layout.channels:
         return Contents(source, trials=frame)
     rate_hz, head = required(layout, "rate_hz", f"the sampling rate of {source}"), frame.attrs.get("head", "")
@@ -60,18 +59,6 @@ def read(path: Path, layout: Layout) -> Contents:
     return Contents(source, tuple(tracks), events_of(rows))
 
 
-def _frame(path: Path, layout: Layout) -> pd.DataFrame:
-    """The table in a file; raise in other words if it seems to be of samples."""
-    try:
-        return frames.read_frame(path, layout)
-    except InvalidValueError as error:
-        if path.suffix.lower() not in frames.TEXTS or not _PERIOD.search(frames.text_of_file(path)[:_HEAD]):
-            raise
-        what = f"{path.name} seems to hold samples, and it is not known in which lines and columns they are"
-        remedy = "Describe it in a layout, as docs/your-data.md does for LabChart, AcqKnowledge and Spike2 (--layout)."
-        raise InvalidValueError(what, got=error.got, remedy=remedy) from error
-
-
 def required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:
     """What a layout states, since the file does not."""
     value: float | None = getattr(layout, key)
@@ -89,8 +76,7 @@ def require_rate(stated_hz: float, found_hz: float, where: str, remedy: str = _O
 
 def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[int, float]] | None:
     """The rate that times of samples say, and how long pauses were before some [s]; None if they are no such times."""
-    times = pd.to_numeric(cells.astype(str).str.replace(",", "."), errors="coerce").to_numpy(dtype=np.float64)
-    steps = np.diff(times)
+    steps = np.diff(pd.to_numeric(cells.astype(str).str.replace(",", "."), errors="coerce").to_numpy(dtype=np.float64))
     usual = float(np.median(steps)) if len(steps) > 1 else 0.0
     late = np.flatnonzero((steps > 1.5 * usual) | (steps < 0))  # or they begin again, and nobody knows how much later
     if not 0 < len(late) < _FEW * len(steps):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing import frames, quantities
 from isiw.existing.formats import columns
-from isiw.existing.formats.contents import Contents, Track, events_of, parted
+from isiw.existing.formats.contents import Contents, Track, parted
 from isiw.existing.layout import EMG_UNITS, WORDS, Layout, letters
 from isiw.lazy import pd
 
@@ -19,21 +18,16 @@ from isiw.lazy import pd
 def read(path: Path, layout: Layout) -> Contents:
     """A table of vectors, a recording in vectors, or sweeps beside a vector of their ISIs."""
     source, name = path.name, layout.channels.get("emg")
-    arrays = frames.read_arrays(path)
-    if {"data", "datastart", "dataend", "titles"} <= arrays.keys():
-        return _of_labchart(arrays, source)
     if name is None:
         return columns.read(path, layout)
+    arrays = frames.read_arrays(path)
     quantities.require_one("array", source, name, arrays)
     rate_hz = columns.required(layout, "rate_hz", f"the sampling rate of {source}")
-    for other, array in arrays.items():
-        number, word = (
-            float(array.item()) if array.size == 1 and array.dtype.kind in "fiu" else 0.0,
-            letters(other.rpartition(".")[2]),
-        )
-        if number and word in WORDS["rates"]:
+    numbers = {other: array.item() for other, array in arrays.items() if array.size == 1 and array.dtype.kind in "fiu"}
+    for other, number in numbers.items():
+        if number > 0 and (word := letters(other.split(".")[-1])) in WORDS["rates"]:
             columns.require_rate(rate_hz, number, f"{other!r} of {source}")
-        if number > 0 and word in WORDS["periods"]:
+        elif number > 0 and word in WORDS["periods"]:
             columns.require_period(rate_hz, number, None, f"{other!r} of {source}")
     if arrays[name].squeeze().ndim < 2:
         return columns.read(path, layout)
@@ -51,35 +45,6 @@ def read(path: Path, layout: Layout) -> Contents:
     stretches = parted(range(0, flat.size, flat.size // count), flat.size, rate_hz)
     track = Track.of_values(name, rate_hz, stretches, flat, quantities.unit_said(said, EMG_UNITS) or "")
     return Contents(source, (track,), trials=beside, pulse_at_s=pulse_at_ms / 1e3)
-
-
-def _of_labchart(arrays: Mapping[str, np.ndarray], source: str) -> Contents:
-    """The channels and comments that LabChart exports: all samples in a row, those of each channel block by block."""
-    titles = [str(title).strip() for title in np.atleast_1d(arrays["titles"])]
-    usual = {"scaleunits": 1.0, "scaleoffset": 0.0}  # of whole numbers
-    begins, ends, rates, of_units, scales, offsets = (
-        np.broadcast_to(np.asarray(arrays.get(name, usual.get(name)), np.float64), arrays["datastart"].shape).reshape(
-            len(titles), -1
-        )
-        for name in ("datastart", "dataend", "samplerate", "unittextmap", *usual)
-    )
-    units, tracks = ["", *map(str, np.atleast_1d(arrays["unittext"]))], []
-    for n, title in enumerate(titles):
-        spans = zip(begins[n].astype(int), ends[n].astype(int), offsets[n], scales[n], strict=True)  # -1 of none
-        parts = [(arrays["data"].ravel()[max(a - 1, 0) : max(b, 0)] + offset) * scale for a, b, offset, scale in spans]
-        cuts = np.cumsum([*map(len, parts)]).tolist()
-        unit = units[max(int(of_units[n, 0]), 0)].strip()
-        tracks.append(
-            Track.of_values(title, rates[n, 0], parted(cuts, cuts[-1], rates[n, 0]), np.concatenate(parts), unit)
-        )
-    texts, ticks_hz, blocks = (
-        np.atleast_1d(arrays.get("comtext", ())),
-        np.ravel(arrays["tickrate"]),
-        tracks[0].stretches,
-    )
-    rows = [(str(texts[int(text) - 1]).strip(), blocks[int(n) - 1].start_s + at / ticks_hz[int(n) - 1], 0.0)
-            for _, n, at, _, text in np.reshape(arrays.get("com", ()), (-1, 5))]  # fmt: skip
-    return Contents(source, tuple(tracks), events_of(rows))
 
 
 def _require_zero(name: str, times: Any, rate_hz: float, pulse_at_ms: float, source: str) -> None:
