@@ -38,9 +38,7 @@ _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "
 ANSWER: Final = "answer.json"
 SAMPLES: Final = "samples.f8"
 
-_KINDS: Final[Mapping[str, type[IsiwError]]] = {
-    kind.__name__: kind for kind in (InvalidValueError, errors.ConfigError, errors.LogError)
-}
+_KINDS: Final = {one.__name__: one for one in (InvalidValueError, errors.ConfigError, errors.LogError)}
 
 
 class _Shown(str):

@@ -74,12 +74,12 @@ def read_files(
     """The people of some files, and where their logs go: one log (.mcap), or a folder for a log of each."""
     everybody = [person for source in sources for person in _read(Path(source), way)]
     refused = spelt_otherwise(one.delivered.subject for one in everybody)
-    people = [
-        one._replace(refused=refused.get(code)) for one in everybody if only in {None, code := one.delivered.subject}
-    ]
+    wanted = [one for one in everybody if only in {None, one.delivered.subject}]
+    people = [one._replace(refused=refused.get(one.delivered.subject)) for one in wanted]
     if only is not None and not people:
-        there = codes_of([one.delivered for one in everybody])
-        raise InvalidValueError("no person has this code", got=only, expected=there)
+        raise InvalidValueError(
+            "no person has this code", got=only, expected=codes_of([one.delivered for one in everybody])
+        )
     found = _placed(people, output)
     for person in found:
         if person.log is not None and person.refused is None and log_exists(person.log) and not is_there(person):

@@ -147,9 +147,11 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
             raise column.doubted(why, stated, remedy, expected)
         if usual is None and not signs[key] and (doubtful := _doubtful(column)):
             sign = "comma" if "," in doubtful else "point"
-            what = f"the {sign} in the column {column.name!r} of {column.of} may be a decimal sign, or group thousands"
-            remedy = "Say --decimal , or --decimal . to name the decimal sign."
-            raise InvalidValueError(what, got=doubtful, remedy=remedy)
+            why, remedy = (
+                f"has a {sign} that may be a decimal sign, or group thousands",
+                "Say --decimal , or --decimal .",
+            )
+            raise column.doubted(why, doubtful, remedy)
         found[key] = replace(column, decimal=max(signs[key], key=",.".find, default=usual or "."))
     return found
 

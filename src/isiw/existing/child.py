@@ -11,7 +11,6 @@ import os
 import stat
 import sys
 import sysconfig
-import time
 import zoneinfo
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -52,19 +51,16 @@ def _answer(request: Mapping[str, Any], folder: Path) -> None:
     own = _load_libraries(path)
     csv.field_size_limit(2**31 - 1)  # a cell that is too long is refused in words later
     limit("DATA", 1e6 * limits.memory_mb)
-    limit("CPU", 1 + time.process_time() + seconds_for(limits, path, table=formats.format_of(path).is_table))
+    limit("CPU", seconds_for(limits, path, table=formats.format_of(path).is_table))
     gate = Gate(path, [Path(other) for other in request["also"]], own)
     sys.addaudithook(gate)
     try:
         require_no_links(path)
         contents = contents_in(path, layout, limits)
         if contents.trials is not None:  # for so many rows, of which trials are made, there is more time
-            rows = len(contents.trials)
-            limit("CPU", 1 + time.process_time() + seconds_for(limits, path, table=True, rows=rows))
-        if request["look"]:
-            found = seen_in(contents, path, layout, limits)
-        else:
-            found = Answer(people_of_contents(contents, path, layout, request["subject"], limits), {})
+            limit("CPU", seconds_for(limits, path, table=True, rows=len(contents.trials)))
+        people = [] if request["look"] else people_of_contents(contents, path, layout, request["subject"], limits)
+        found = seen_in(contents, path, layout, limits) if request["look"] else Answer(people, {})
     finally:
         gate.require_nothing_refused()
     write_answer(folder, found, gate.hashes())

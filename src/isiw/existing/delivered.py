@@ -132,11 +132,9 @@ class Delivered:
 
     def _refuse_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> NoReturn:
         said = f"If they are in {fits[0]}, say --unit {fits[0]}; if" if fits else "If"
-        other = f"column holds them, say --column {key}=NAME"
-        if self.sweeps:
-            other = "channel holds the EMG, say --channel emg=NAME"
+        other = "channel holds the EMG, say --channel emg" if self.sweeps else f"column holds them, say --column {key}"
         what = f"the {what} of {self.named} cannot be in {stated}"
-        raise InvalidValueError(what, got=got, remedy=f"{said} another {other}.")
+        raise InvalidValueError(what, got=got, remedy=f"{said} another {other}=NAME.")
 
 
 def anywhere(reference: Reference) -> DesignSpace:
@@ -182,7 +180,7 @@ def spelt_otherwise(codes: Iterable[str]) -> dict[str, InvalidValueError]:
     remedy = "For the same person write one code everywhere; for another, one that differs in more."
     only = "differs from another one only in case, spaces, hyphens or underscores"
     return {code: InvalidValueError(f"the code {code} {only}", got=", ".join(sorted(group - {code})), remedy=remedy)
-            for group in alike.values() if len(group) > 1 for code in group}  # fmt: skip
+            for group in alike.values() if len(group) > 1 for code in sorted(group)}  # fmt: skip
 
 
 def codes_of(people: Sequence[Delivered]) -> str:

@@ -61,8 +61,7 @@ _OTHERWISE: Final = (
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
 _INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
 _FEW: Final = 3
-_CODE: Final = 4  # a shorter text in rows that follow each other may be a person's initials
-_WORDS: Final = 4  # in a longer remark a word such as bad may be of something else
+_CODE, _WORDS = 4, 4  # a shorter text in rows that follow may be initials; in a longer remark bad may be of something
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
 _FEWEST: Final = 12  # in a table with fewer rows ISIs may come again by chance
 _SHARED: Final = 0.8
@@ -150,10 +149,10 @@ def _is_verdict(text: str) -> bool:
     return not words.isdisjoint(WORDS["left out"]) and words.isdisjoint(WORDS["no"])
 
 
-def require_no_summaries(columns: Columns, rows: Sequence[int], apart: int | None) -> None:
+def require_no_summaries(columns: Columns, apart: int | None) -> None:
     """Raise if rows from one `apart` on, or with more digits than others, are by their numbers means or SDs."""
     isi, mep = columns["isi"], columns["mep"]
-    known = [row for row in rows if mep.number(row) is not None]
+    known = [row for row in columns.rows if mep.number(row) is not None]
     meps = np.array([mep.number(row) for row in known])
     texts = [isi.texts[row].replace(isi.decimal, ".") for row in known]
     isis = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce").to_numpy(dtype=np.float64)

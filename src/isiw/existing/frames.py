@@ -28,9 +28,7 @@ TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
 WORKBOOKS: Final = (".xlsx", ".xlsm")
 STATISTICS: Final = {".sav": "read_sav", ".zsav": "read_sav", ".por": "read_por", ".dta": "read_dta"}
 """Files of SPSS and Stata, and which function of pyreadstat reads them."""
-
-_LINES: Final = 100  # within so many lines the columns' names are sought
-_HEAD: Final = 40  # so many bytes show how a text is encoded
+_LINES, _HEAD = 100, 40  # within so many lines the columns' names are sought; so many bytes show how a text is encoded
 _BLANKS: Final = r"\s+"
 _COUNT: Final = "If these trials count, show them as the others; if not, mark them in a column called exclude."
 _SHOWN_OTHERWISE: Final = (
@@ -164,9 +162,9 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
         if not all(is_missing(cell) for cell in row[len(names) :]):
             what = f"row {number} has {len(row)} cells, but there are {len(names)} names: no table that can be read"
             remedy = (
-                "Is a decimal comma also what separates the cells? Save the file with another separator. If these are "
+                "Is a decimal comma also what separates the cells? Save the file with another separator. If it has "
             )
-            remedy += "samples, describe lines and columns in a layout, as docs/your-data.md does (--layout)."
+            remedy += "samples, describe it in a layout, as docs/your-data.md does (--layout)."
             raise InvalidValueError(what, got=" | ".join(map(str, row[: len(names) + 2])), remedy=remedy)
     table = pd.DataFrame([[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body], columns=names)
     table.attrs["title"] = title
@@ -270,6 +268,9 @@ def read_arrays(path: Path) -> dict[str, Any]:
         values = library("pymatreader", "import").read_mat(str(path))
     else:
         values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
+    if {"data", "datastart", "dataend", "titles"} <= values.keys():
+        remedy = "In LabChart: File, Export, LabChart text (.txt), and a layout: docs/your-data.md."
+        raise InvalidValueError("this has LabChart's channels one behind the other", got="data", remedy=remedy)
     paths = dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
     last = Counter(path[-1] for path in paths)
     return {path[-1] if last[path[-1]] == 1 else ".".join(path): array for path, array in paths.items()}
@@ -289,9 +290,6 @@ def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
 
 def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
     """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
-    if {"data", "datastart", "dataend", "titles"} <= arrays.keys():
-        remedy = "In LabChart: File, Export, LabChart text (.txt), and a layout: docs/your-data.md."
-        raise InvalidValueError("this has LabChart's channels one behind the other", got="data", remedy=remedy)
     squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
     vectors = {name: array for name, array in squeezed.items() if array.ndim == 1}
     texts = {name: str(array.item()) for name, array in arrays.items() if array.size == 1 and array.dtype.kind in "UO"}

@@ -20,12 +20,11 @@ ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µ
 EMG_UNITS: Final[Mapping[str, float]] = {**EMG_UNITS_MV, "nV": 1e-6}  # in mV
 _FOUND: Final = {kind: {key: tuple(" ".join(word.split()) for word in text.split(",")) for key, text in texts.items()}
                  for kind, texts in read_toml(Path(__file__).with_name("words.toml")).items()}  # fmt: skip
-UNIT_WORDS: Final[Mapping[str, str]] = {word: unit for unit, words in _FOUND["units"].items() for word in words}
-"""Units as files write them, in lower case."""
+UNIT_WORDS: Final[Mapping[str, str]] = {
+    word: unit for unit, words in _FOUND["units"].items() for word in words
+}  # lower case
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = _FOUND["columns"]
-"""By what they are called in letters alone, the columns that are found without being named; the first name wins."""
 WORDS: Final[Mapping[str, frozenset[str]]] = {kind: frozenset(words) for kind, words in _FOUND["words"].items()}
-"""Words of cells, and of columns' names in letters alone, by what they say."""
 MARKS: Final[Mapping[str, tuple[str, str]]] = {
     "pulse": ("the pulse of TMS", "tms pulse tmspulse magneticpulse"),
     "tap": ("the tap (its impact) or the electrical pulse", "tap impact hit electricalpulse conditioning pns"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import os
 import re
+import time
 import zipfile
 from dataclasses import dataclass, fields, replace
 from itertools import islice
@@ -26,8 +27,7 @@ _ROWS_PER_S: Final = 2e3  # a second more for each so many rows, once they are r
 _SIGNS: Final = (b"\t", b";", b",", b"|")  # what separates the cells of a text
 _BLANKS: Final = re.compile(rb"\s\S")  # or else blanks do
 _BYTES_PER_SIGN: Final = 4  # a character takes no more
-_FIRST_LINES: Final = 100
-_CHUNK: Final = 2**20
+_FIRST_LINES, _CHUNK = 100, 2**20
 LARGEST_FACTOR: Final = 1e6  # by which limits are multiplied at most, so that each remains a number
 
 
@@ -148,8 +148,8 @@ def require_most(source: str, *counts: tuple[str, float, float, str]) -> None:
 
 
 def limit(kind: Literal["DATA", "CPU"], most: float) -> None:
-    """Limit the memory of this process [bytes], which Linux counts, or its processor time [s], but not on Windows."""
+    """Limit the memory of this process [bytes] on Linux, or its processor time from now on [s], but on Windows."""
     if resource is not None:
-        limited = getattr(resource, f"RLIMIT_{kind}")
+        limited, begun = getattr(resource, f"RLIMIT_{kind}"), 1 + time.process_time() if kind == "CPU" else 0
         _, hard = resource.getrlimit(limited)
-        resource.setrlimit(limited, (int(most if hard < 0 else min(most, hard)), hard))
+        resource.setrlimit(limited, (int(most + begun if hard < 0 else min(most + begun, hard)), hard))

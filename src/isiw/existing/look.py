@@ -172,13 +172,12 @@ def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout
 
 def _of_table(contents: Contents, layout: Layout) -> Iterator[str]:
     frame = named(contents.trials)
-    try:
+    held = dict[str, str]()
+    with suppress(IsiwError):
         found = Columns.found(frame, replace(layout, units=layout.units or ("ms", "mV")), contents.source)
         held = {column.name.partition(" (")[0]: key for key, column in found.of.items()}
-    except IsiwError:
-        held = {}
     for place, name in enumerate(frame.columns[:_MOST]):
-        kinds = list(dict.fromkeys(map(str, frame.iloc[:, place].tolist())))
+        kinds = [*dict.fromkeys(map(str, frame.iloc[:, place].tolist()))]
         some = ", ".join(kinds[:4]) + (f" … ({len(kinds)} different)" if len(kinds) > 4 else "")
         key = held.get(str(name), held.get(str(name).partition(" (")[0]))
         yield f"  column {str(name)!r}{f', the {key}' if key else ''}: {some}"

@@ -101,10 +101,8 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
     alone_s = times_of(events, None if alone_name in {pulse_name, origin_name} else alone_name)
     more_s = [at for at in alone_s.tolist() if not np.any(np.abs(at_s - at) <= _SAME_PULSE_S)]
     epochs = events[events["name"].astype(str) == "sweep"]
-    pulses = [
-        _placed(at, origins_s, epochs, alone=bool(np.any(np.abs(alone_s - at) <= _SAME_PULSE_S)), layout=layout)
-        for at in sorted([*at_s.tolist(), *more_s])
-    ]
+    pulses = [_placed(at, origins_s, epochs, alone=bool(np.any(np.abs(alone_s - at) <= _SAME_PULSE_S)), layout=layout)
+              for at in sorted([*at_s.tolist(), *more_s])]  # fmt: skip
     _require_one_each(pulses, origins_s, layout, source)
     return _with_the_unmarked(pulses, layout, source)
 
@@ -146,8 +144,7 @@ def _with_the_unmarked(pulses: list[Pulse], layout: Layout, source: str) -> list
     """Pulses of which the file says whether a tap came, or the operator does."""
     paired = [pulse for pulse in pulses if pulse.isi_s is not None]
     if both := [pulse for pulse in paired if pulse.alone]:
-        came_ms = 1e3 * (both[0].isi_s or 0.0)
-        what = f"an event of {source} says TMS alone, and a tap came {came_ms:.0f} ms before the pulse"
+        what = f"an event of {source} says TMS alone, and a tap came {1e3 * (both[0].isi_s or 0):.0f} ms before it"
         remedy = "Are both markers the right ones? Say --marker alone=NAME and --marker tap=NAME."
         raise InvalidValueError(what, got=f"at {both[0].at_s:.3f} s", remedy=remedy)
     if (early := sum((pulse.isi_s or 0.0) < 0 for pulse in paired)) > 2 and 2 * early > len(paired):

@@ -104,10 +104,8 @@ def people_of_contents(
         raise InvalidValueError(f"{contents.source} has no channel of samples at a rate", remedy=remedy)
     _require_used(contents, path, layout)
     name = subject or ("" if path is None else path.stem)
-    if contents.tracks:
-        people = [recordings.of_contents(contents, layout, name)]
-    else:
-        people = _people_of(frames.named(contents.trials), layout, contents.source, name, limits)
+    people = ([recordings.of_contents(contents, layout, name)] if contents.tracks
+              else _people_of(frames.named(contents.trials), layout, contents.source, name, limits))  # fmt: skip
     for one in people:
         doubts.require_short(one, layout)
     return people
@@ -158,9 +156,8 @@ def _people_of(
     reference = layout.required_reference(source)
     columns = Columns.found(frame, layout, source)
     given = [columns[key].cells for key in ("isi", "mep", "asked")]
-    rows = [n for n in columns.rows if not all(is_missing(cells[n]) for cells in given)]
-    after_empty = [after for before, after in pairwise([*rows]) if after - before > 1][-1:]
-    columns = replace(columns, rows=rows)
+    empty = {n for n in columns.rows if all(is_missing(cells[n]) for cells in given)}
+    columns = replace(columns, rows=[n for n in columns.rows if n not in empty])
     if not columns.rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
     doubts.require_codes(columns)
@@ -177,7 +174,8 @@ def _people_of(
         begun = dates[own[0]].isoformat(timespec="microseconds") if own[0] in dates else ""
         given_by = latest_of([columns["date"].text(row) for row in own], [dates.get(row) for row in own])
         found.append(replace(person, visit=replace(person.visit, day=day), created=begun, given_by=given_by))
-    doubts.require_no_summaries(columns, rows, *(after_empty or [frame.attrs.get("apart")]))
+    apart = max((row for row in columns.rows if row - 1 in empty), default=frame.attrs.get("apart"))
+    doubts.require_no_summaries(columns, apart)
     return found
 
 

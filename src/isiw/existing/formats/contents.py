@@ -8,7 +8,6 @@ from functools import partial
 from itertools import pairwise
 from operator import itemgetter
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -39,14 +38,14 @@ class Stretch(NamedTuple):
 
 
 def parted(
-    cuts: Iterable[int], samples: int, rate_hz: float, missing_s: Mapping[int, float] = MappingProxyType({})
+    cuts: Iterable[int], samples: int, rate_hz: float, missing_s: Mapping[int, float] | None = None
 ) -> tuple[Stretch, ...]:
     """Samples as stretches: before those at cuts something is missing, for `APART_S` if it is not known how long."""
     found, first, start_s = list[Stretch](), 0, 0.0
     for at in sorted({*cuts, samples}):
         if first < at <= samples:
             found.append(Stretch(first, at - first, start_s))
-            first, start_s = at, start_s + (at - first) / rate_hz + (missing_s.get(at) or APART_S)
+            first, start_s = at, start_s + (at - first) / rate_hz + ((missing_s or {}).get(at) or APART_S)
     return tuple(found)
 
 
