@@ -56,8 +56,8 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         what = f"two pulses of {source} are less than {1e3 * _AFTER_S:g} ms apart"
         raise InvalidValueError(what, remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.")
     limits = SignalLimits() if layout.mep_window_ms is None else SignalLimits(mep_window_ms=layout.mep_window_ms)
-    longest_s, trials, sweeps = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0), list[Trial](), {}
-    seen = list[tuple[Sweep, Trial]]()
+    longest_s, trials = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0), list[Trial]()
+    seen, sweeps = list[tuple[Sweep, Trial]](), dict[int, Mapping[str, Channel]]()
     bad = contents.events[contents.events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         sweep = _cut(signals, pulse, pulse.at_s - _BEFORE_S - longest_s, key)
