@@ -442,15 +442,7 @@ def test_codes_of_triggers_that_overlap_are_told_apart_in_fif_and_in_bdf(tmp_pat
 def as_status(path: Path, values: np.ndarray) -> Path:
     """A BDF file as BioSemi writes it: EMG [µV], and codes in the lower bits of a channel called Status."""
     count, scales = values.shape[1] // int(RATE_HZ), [[-8000, -8388608], [8000, 8388607], [-8388608] * 2, [8388607] * 2]
-    said: list[list[Any]] = [
-        ["FCR", "Status"],
-        ["", ""],
-        ["uV", "Boolean"],
-        *scales,
-        ["", ""],
-        [int(RATE_HZ)] * 2,
-        ["", ""],
-    ]
+    said: list[Any] = [["FCR", "Status"], [""] * 2, ["uV", "Boolean"], *scales, [""] * 2, [int(RATE_HZ)] * 2, [""] * 2]
     sizes = [16, 80, 8, 8, 8, 8, 8, 80, 8, 32]
     top = [("BIOSEMI", 7), ("", 80), ("", 80), ("01.01.26", 8), ("10.00.00", 8), (768, 8), ("24BIT", 44), (count, 8)]
     top += [(1, 8), (2, 4), *((one, size) for each, size in zip(said, sizes, strict=True) for one in each)]
