@@ -73,9 +73,8 @@ def read_files(
 ) -> list[Person]:
     """The people of some files, and where their logs go: one log (.mcap), or a folder for a log of each."""
     everybody = [person for source in sources for person in _read(Path(source), way)]
-    refused = spelt_otherwise(one.delivered.subject for one in everybody)
-    wanted = [one for one in everybody if only in {None, one.delivered.subject}]
-    people = [one._replace(refused=refused.get(one.delivered.subject)) for one in wanted]
+    why = spelt_otherwise(one.delivered.subject for one in everybody)
+    people = [one._replace(refused=why.get(code)) for one in everybody if only in {None, code := one.delivered.subject}]
     if only is not None and not people:
         raise InvalidValueError(
             "no person has this code", got=only, expected=codes_of([one.delivered for one in everybody])

@@ -15,7 +15,7 @@ from numbers import Real
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError
-from isiw.existing.layout import WORDS, plain, unit_named
+from isiw.existing.layout import ISI_UNITS_MS, WORDS, Layout, plain, unit_named
 from isiw.lazy import pd
 
 _NUMBER: Final = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
@@ -171,6 +171,18 @@ def _doubtful(column: Column) -> str | None:
     doubtful = [text for text in texts if any(grouped.fullmatch(text) for grouped in _GROUPED.values())]
     are_asked = bool(doubtful) and ("," in doubtful[0] or any(text.isdigit() for text in texts))
     return doubtful[0] if are_asked else None
+
+
+def required_unit(layout: Layout, known: Mapping[str, float], said: str | None, what: str, got: str | None) -> str:
+    """The unit of something: the one that is stated, or else the one that the file says."""
+    unit = layout.unit_of(known) or said
+    if unit is None or unit not in known:
+        units, what = (
+            "ms or s" if known is ISI_UNITS_MS else "mV, uV or V",
+            f"the unit of {what} is not stated or unknown",
+        )
+        raise InvalidValueError(what, got=got, remedy=f"Say --unit with {units}.")
+    return unit
 
 
 def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:

@@ -9,8 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
-from functools import partial
-from itertools import groupby, pairwise
+from itertools import chain, groupby, pairwise
 from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
@@ -21,7 +20,7 @@ from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import LONGEST_ISI_MS, Delivered
 from isiw.existing.layout import COLUMNS, WORDS, Layout, letters, plain
 from isiw.findings import AMPLITUDE_MV
-from isiw.lazy import pd, scipy
+from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import FloatArray, Reference
 
@@ -60,11 +59,11 @@ _OTHERWISE: Final = (
 )  # fmt: skip # what a column's name says of numbers that are no amplitudes or ISIs, and what is expected
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
 _INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
-_FEW: Final = 3
+_NUMBER: Final = re.compile(r"[-.,]*\d[\d.,]*")
+_FEW, _BELOW = 3, 50  # so many rows at most are below the trials
 _CODE, _WORDS = 4, 4  # a shorter text in rows that follow may be initials; in a longer remark bad may be of something
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
-_FEWEST: Final = 12  # in a table with fewer rows ISIs may come again by chance
-_SHARED: Final = 0.8
+_FEWEST, _SHARED = 12, 0.8  # in a table with fewer rows ISIs may come again by chance
 _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
 
@@ -97,10 +96,12 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
     rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
     once = len(rows) > 2 and len({*rows}) == len(rows)
+    known = WORDS["spreads"] | WORDS["sums"] | WORDS["means"]
     for name, cells in others.items():
         for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
-            are_codes = len(odd) < _CODE and any(one == other == odd for one, other in pairwise(cells))
-            if not are_codes and _says(odd, WORDS["spreads"] | WORDS["sums"] | WORDS["means"]):
+            if _says(odd, known) and not (
+                len(odd) < _CODE and any(one == other == odd for one, other in pairwise(cells))
+            ):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
     title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
@@ -123,11 +124,12 @@ def _says(text: str, known: AbstractSet[str]) -> bool:
 def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> None:
     """Raise if a column of which nothing is read says that a trial does not count, in its cells or by its name."""
     for column in beside:
-        key, texts = key_of_flags(column.name), [*map(str.casefold, column.texts)]
+        key = key_of_flags(column.name)
+        texts = [*map(str.casefold, column.texts)] if key and column.name not in where else []
         kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
         odd = [row for row, text in enumerate(texts) if text in kinds]
         are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
-        if key and column.name not in where and are_flags and 0 < len(odd) < len(texts):
+        if are_flags and 0 < len(odd) < len(texts):
             remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
             raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
         remarks = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
@@ -156,24 +158,27 @@ def require_no_summaries(columns: Columns, apart: int | None) -> None:
     meps = np.array([mep.number(row) for row in known])
     texts = [isi.texts[row].replace(isi.decimal, ".") for row in known]
     isis = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce").to_numpy(dtype=np.float64)
-    digits = [len(mep.text(row).partition(mep.decimal)[2]) for row in known]
+    digits = [len(mep.texts[row].partition(mep.decimal)[2]) for row in known]
     below = next((n for n, row in enumerate(known) if apart is not None and row >= apart), len(known))
-    for begin in sorted({below, *range(max(len(known) - _FEW, 0), len(known))} - {len(known)}):
+    for begin in sorted(
+        {max(below, len(known) - _BELOW), *range(max(len(known) - _FEW, 0), len(known))} - {len(known)}
+    ):
         above, of_isis = meps[:begin], isis[:begin]
         agree = [_is_summary(meps[n], digits[n], above, above[of_isis == isis[n]]) for n in range(begin, len(known))]
         if len(above) < _FEW or columns["order"].text(known[begin]) or 2 * sum(agree) <= len(agree):
             continue
         finer = digits[begin] > max(digits[:begin]) or np.isclose(isis[begin], np.nanmean(of_isis), rtol=1e-3)
-        if begin == below or (finer and agree[0]):
+        if below == begin or (finer and agree[0]):
             remedy = "Delete the rows below the trials; if these are trials, number all in a column called trial."
             raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", remedy)
 
 
 def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
     """True if a number is, as far as its digits say, a mean or median of others, their SD, or its standard error."""
-    kinds = (np.mean, np.median, np.std, partial(np.std, ddof=1), scipy.stats.sem)
-    slack, known = max(0.51 * 10.0**-digits, 1e-9 * abs(number)), [group for group in groups if len(group) > 1]
-    return number not in groups[0] and any(abs(kind(group) - number) <= slack for group in known for kind in kinds)
+    slack, of = max(0.51 * 10.0**-digits, 1e-9 * abs(number)), [group for group in groups if len(group) > 1]
+    sds = [(sd := float(np.std(group, ddof=one)), sd / len(group) ** 0.5) for group in of for one in (0, 1)]
+    means = [each for group in of for each in (np.mean(group), np.median(group))]
+    return number not in groups[0] and any(abs(each - number) <= slack for each in (*means, *chain(*sds)))
 
 
 def require_reference(isi: Column, reference: Reference | None) -> None:
@@ -240,7 +245,7 @@ def _require_ascending(columns: Columns) -> None:
         return
     order = replace(order, decimal=columns["isi"].decimal)
     known = {row: text for row in columns.rows if (text := order.text(row))}
-    odd = [row for row, text in known.items() if order.name == columns["date"].name or not _is_number(text)]
+    odd = [row for row, text in known.items() if order.name == columns["date"].name or not _NUMBER.fullmatch(text)]
     if 0 < len(odd) < len(known):
         raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
     places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
@@ -258,10 +263,6 @@ def _require_ascending(columns: Columns) -> None:
         raise InvalidValueError(what, got=f"{twice[0]:g}", remedy=remedy)
 
 
-def _is_number(text: str) -> bool:
-    return re.sub("[.,]", "", text).lstrip("-").isdigit()
-
-
 def require_said(columns: Columns) -> None:
     """Raise if it is not stated what rows without an ISI are, or if a row is both a pair and TMS alone."""
     isi, condition, paired = columns["isi"], columns["condition"], columns.paired
@@ -270,7 +271,7 @@ def require_said(columns: Columns) -> None:
         if (by := columns.called_alone(row)) is not None and not (by is condition and one_word):
             remedy = "If it is TMS alone, leave its ISI empty, or say --alone with it; if a pair, rename the column."
             raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
-    said = [columns["status"].flag(row) for row in columns.rows]
+    said = [columns["status"].flag(row) for row in columns.rows if "status" in columns.of]
     if {*said} == {None, True}:
         row = columns.rows[said.index(None)]
         raise columns["status"].refused(row, "is empty, and others say yes", "Write yes or no into each row.")
@@ -289,7 +290,7 @@ def _require_one_kind(columns: Columns) -> None:
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
     for name, column in columns.beside.items():
         texts = [text for _, row in by_isi if (text := column.text(row))]
-        are_words = not any(map(_is_number, texts))
+        are_words = not any(map(_NUMBER.fullmatch, texts))
         kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
         if name in columns.layout.where or len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
             continue
@@ -338,10 +339,10 @@ def _require_isis(columns: Columns) -> None:
 def _require_one_intensity(columns: Columns) -> None:
     """Raise if TMS alone had other intensities than pairs by a column that is not used, so that it is no baseline."""
     for name, column in columns.beside.items():
-        texts = {row: column.text(row) for row in columns.rows}
-        of_pairs = {texts[row]: None for row in columns.paired if texts[row]}
-        others = dict.fromkeys(text for text in texts.values() if text not in {"", *of_pairs})
-        if name not in columns.layout.where and of_pairs and others and _INTENSITY.search(_words(name)):
+        rows = columns.rows if name not in columns.layout.where and _INTENSITY.search(_words(name)) else ()
+        of_pairs = {text: None for row in columns.paired if rows and (text := column.text(row))}
+        others = dict.fromkeys(text for row in rows if (text := column.text(row)) not in {"", *of_pairs})
+        if of_pairs and others:
             remedy = (
                 f'Say --where "{name}={next(iter(of_pairs))}", or name a column in % of the resting motor threshold '
             )

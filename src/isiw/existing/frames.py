@@ -26,8 +26,7 @@ from isiw.text.sanitize import counted
 
 TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
 WORKBOOKS: Final = (".xlsx", ".xlsm")
-STATISTICS: Final = {".sav": "read_sav", ".zsav": "read_sav", ".por": "read_por", ".dta": "read_dta"}
-"""Files of SPSS and Stata, and which function of pyreadstat reads them."""
+STATISTICS: Final = {".sav": "read_sav", ".zsav": "read_sav", ".por": "read_por", ".dta": "read_dta"}  # of pyreadstat
 _LINES, _HEAD = 100, 40  # within so many lines the columns' names are sought; so many bytes show how a text is encoded
 _BLANKS: Final = r"\s+"
 _COUNT: Final = "If these trials count, show them as the others; if not, mark them in a column called exclude."

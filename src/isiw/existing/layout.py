@@ -130,15 +130,6 @@ class Layout(Checked):
         """The unit that is stated, of those of one quantity."""
         return next((unit for unit in self.units if unit in known), None)
 
-    def required_unit(self, known: Mapping[str, float], said: str | None, what: str, got: str | None) -> str:
-        """The unit of something: the one that is stated, or else the one that the file says."""
-        unit = self.unit_of(known) or said
-        if unit is None or unit not in known:
-            units = "ms or s" if known is ISI_UNITS_MS else "mV, uV or V"
-            what = f"the unit of {what} is not stated, or unknown"
-            raise InvalidValueError(what, got=got, remedy=f"Say --unit with {units}.")
-        return unit
-
     def saying(self, **values: Any) -> Layout:
         """The same, with what is said besides; of tables, the entries that are given."""
         given = {key: value for key, value in values.items() if value not in (None, (), {})}

@@ -68,13 +68,12 @@ def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str 
     """The name of the events that mark something; None if none of them does."""
     fitting = _fitting(events, key, layout)
     if key in layout.markers and len(fitting) != 1:
-        what = "several events" if fitting else "no event"
-        expected = f"one of {', '.join(map(repr, names_of(events)))}"
-        raise InvalidValueError(f"{source} has {what} of this name", got=layout.markers[key], expected=expected)
+        what = f"{source} has {'several events' if fitting else 'no event'} of this name"
+        expected = ", ".join(map(repr, names_of(events)))
+        raise InvalidValueError(what, got=layout.markers[key], expected=f"one of {expected}")
     if len(fitting) > 1:
-        what = f"events of {len(fitting)} names in {source} may mark {MARKS[key][0]}"
-        remedy = f'Say --marker "{key}={fitting[0]}", or give all that mark it one name.'
-        raise InvalidValueError(what, got=", ".join(fitting), remedy=remedy)
+        what, got = f"events of {len(fitting)} names in {source} may mark {MARKS[key][0]}", ", ".join(fitting)
+        raise InvalidValueError(what, got=got, remedy=f'Say --marker "{key}={fitting[0]}", or give all one name.')
     return fitting[0] if fitting else None
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing import doubts
-from isiw.existing.cells import Column, says_alone, with_decimals, without_unit_in_cells
+from isiw.existing.cells import Column, required_unit, says_alone, with_decimals, without_unit_in_cells
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, WORDS, Layout, letters, plain, unit_named
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -224,4 +224,4 @@ def _required_unit(key: str, what: str, column: Column, layout: Layout, known: M
         raise column.doubted(f"says a unit of no {what}", other, remedy)
     some = ", ".join(filter(None, column.texts[:5])) or None
     what = f"the {what} of {column.of} in the column {column.name!r}"
-    return layout.required_unit(known, unit_said(column.name, known), what, some)
+    return required_unit(layout, known, unit_said(column.name, known), what, some)

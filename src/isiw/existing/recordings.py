@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import is_missing
+from isiw.existing.cells import is_missing, required_unit
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_said
 from isiw.existing.formats.columns import require_rate
@@ -127,7 +127,7 @@ def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[st
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
     emg = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
     known, notes = unit_named(emg.unit), contents.notes
-    unit = layout.required_unit(EMG_UNITS, known, f"the channel {emg.name!r} of {contents.source}", emg.unit or None)
+    unit = required_unit(layout, EMG_UNITS, known, f"the channel {emg.name!r} of {contents.source}", emg.unit or None)
     if known not in {None, unit}:
         notes = (*notes, f"{contents.source} says {emg.unit}, and {unit} is used, as stated.")
     signals = {key: track for key, track in tracks.items() if key not in MARKERS}

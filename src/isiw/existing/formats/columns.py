@@ -20,8 +20,7 @@ from isiw.lazy import pd
 from isiw.types import FloatArray
 
 _PERIOD: Final = re.compile(r"(?i)(?=interval\W|[\d.]+\s*\w+/sample)(?:interval\W+)?(\d[\d.e-]*)\s*([a-zµ]+)")
-_RATE: Final = re.compile(r"(?:rate|sampl|frequency)[^\n\d]*(\d[\d.]*)\s*(k?)Hz", re.IGNORECASE)
-"""What the lines above samples say of the time between them, or of their rate."""
+_RATE: Final = re.compile(r"(?:rate|sampl|frequency)[^\n\d]*(\d[\d.]*)\s*(k?)Hz", re.IGNORECASE)  # above samples
 _FEW: Final = 0.01  # with a larger share of steps that are longer than usual, times have no pauses but are rounded
 _OF_LAYOUT: Final = "Correct rate_hz in the layout; what has another rate must be a file of its own."
 
