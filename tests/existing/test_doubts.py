@@ -210,8 +210,8 @@ def test_what_was_asked_about_can_be_said() -> None:
 
 
 PLAIN: dict[str, pd.DataFrame] = {
-    "empty rows between blocks": pd.concat([table()[:12], pd.DataFrame([[None, None]], columns=["isi_ms", "mep_mv"]),
-                                            table()[12:]]),
+    "empty rows between blocks": pd.concat([table()[:12], pd.DataFrame([{"isi_ms": None}]), table()[12:]]).assign(
+        mep_uv=lambda rows: (1e3 * rows["mep_mv"]).round()).drop(columns="mep_mv"),
     "numbers of rows that begin again": pd.concat([table()[:18], table()[18:].reset_index(drop=True)]),
     "numbers of trials in each block": table().assign(trial=[*range(18)] * 2, block=[1] * 18 + [2] * 18),
     "a last trial that is like the mean": with_below([20, round(MEAN_MV, 4)]),
@@ -224,7 +224,7 @@ PLAIN: dict[str, pd.DataFrame] = {
 @pytest.mark.parametrize("kind", PLAIN)
 def test_a_plain_table_is_read_whatever_it_resembles(kind: str, tmp_path: Path) -> None:
     PLAIN[kind].to_csv(tmp_path / "P01.csv", index=not kind.startswith("empty"))
-    expected = PLAIN[kind].dropna(subset="mep_mv")
+    expected = PLAIN[kind].dropna(subset="isi_ms")
     for source in (tmp_path / "P01.csv", PLAIN[kind]):
         (person,) = read_people(source, IMPACT)
         assert [trial.isi_ms for trial in person.trials.told] == expected["isi_ms"].tolist()

@@ -154,8 +154,8 @@ def _is_verdict(text: str) -> bool:
 def require_no_summaries(columns: Columns, apart: int | None) -> None:
     """Raise if rows from one `apart` on, or with more digits than others, are by their numbers means or SDs."""
     isi, mep = columns["isi"], columns["mep"]
-    known = [row for row in columns.rows if mep.number(row) is not None]
-    meps = np.array([mep.number(row) for row in known])
+    numbers = {row: number for row in columns.rows if (number := mep.number(row)) is not None}
+    known, meps = [*numbers], np.array([*numbers.values()]) / mep.factor
     texts = [isi.texts[row].replace(isi.decimal, ".") for row in known]
     isis = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce").to_numpy(dtype=np.float64)
     digits = [len(mep.texts[row].partition(mep.decimal)[2]) for row in known]
