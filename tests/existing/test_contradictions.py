@@ -96,17 +96,13 @@ def test_a_sampling_rate_is_compared_with_the_times_in_the_file(tmp_path: Path) 
 
 def test_a_matrix_of_matlab_is_found_or_asked_about(tmp_path: Path) -> None:
     path, sweeps = tmp_path / "P01.mat", np.zeros((3, 100))
-    layout = Layout(
-        reference="impact", rate_hz=4000.0, pulse_at_ms=10.0, units=("mV",), alone="", channels={"emg": "sweeps"}
-    )
+    layout = Layout("impact", units=("mV",), alone="", rate_hz=4000.0, pulse_at_ms=10.0, channels={"emg": "sweeps"})
+    times = {"sweeps": sweeps, "t": np.arange(100) / 4000 - 0.005}
     for arrays, asked in (
         ({"sweep": sweeps}, "no such array"),
         ({"sweeps": sweeps[:, :, None] + np.zeros(2)}, "3 × 100 × 2 samples"),
         ({"sweeps": sweeps, "fs": 2000.0}, "'fs' of P01.mat says"),
-        (
-            {"sweeps": sweeps, "t": np.arange(100) / 4000 - 0.005},
-            "where 't' of P01.mat is 0; got '10 ms'; expected '?5 ms",
-        ),
+        (times, "where 't' of P01.mat is 0; got '10 ms'; expected '?5 ms"),
     ):
         scipy.io.savemat(path, {"isi_ms": [10.0, 20.0, 30.0], **arrays})
         with pytest.raises(InvalidValueError, match=asked):

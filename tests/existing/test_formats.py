@@ -261,6 +261,16 @@ def test_a_file_that_is_none_of_its_format_is_refused_in_words(suffix: str, cont
     assert "\n" not in str(refused.value)
 
 
+def test_a_file_that_does_not_say_where_and_when_its_samples_are_is_asked_about(tmp_path: Path) -> None:
+    path = as_xdf(tmp_path)
+    path.write_bytes(path.read_bytes().replace(b"srate>4000<", b"srate>0000<"))
+    scipy.io.savemat(tmp_path / "P02.mat", {"data": ISIS_MS, "datastart": [1], "dataend": [5], "titles": ["EMG"]})
+    (tmp_path / "P03.txt").write_text("Interval=\t0.00025 s\nChannelTitle=\tEMG\tTMS\n0\t1\t2\n")
+    for name, says in (("P01.xdf", "at a rate"), ("P02.mat", "LabChart's channels"), ("P03.txt", "in a layout")):
+        with pytest.raises(IsiwError, match=says):
+            read(tmp_path / name, Layout("impact"))
+
+
 def test_of_a_folder_the_files_in_it_are_to_be_named(tmp_path: Path) -> None:
     with pytest.raises(IsiwError, match=r"Name its files.*\*\.csv"):
         read(tmp_path)

@@ -156,9 +156,8 @@ def header(number: int, name: str, kind: str, form: str, rate_hz: float, channel
 
 
 def as_xdf(
-    path: Path, *, gap_s: float = 0.0, jitter_s: float = 0.0, offset_s: float = 0.0, codes: bool = False,
-    nominal_hz: float = RATE_HZ,
-) -> Path:  # fmt: skip
+    path: Path, *, gap_s: float = 0.0, jitter_s: float = 0.0, offset_s: float = 0.0, codes: bool = False
+) -> Path:
     """A stream of EMG in chunks of 32 samples, and one of markers, whose clock is behind by an offset.
 
     Args:
@@ -167,12 +166,11 @@ def as_xdf(
         jitter_s: SD of the time of a chunk.
         offset_s: of the clock of the markers.
         codes: whether these are numbers, in a stream of triggers.
-        nominal_hz: the rate that the stream of EMG says.
     """
     (emg_mv, _), rng = recording(), np.random.default_rng(2)
     labels = "<channels><channel><label>FCR</label><unit>microvolts</unit><type>EMG</type></channel></channels>"
     parts = [b"XDF:", chunk(1, b"<?xml version='1.0'?><info><version>1.0</version></info>")]
-    parts.append(header(1, "Amplifier", "EMG", "float32", nominal_hz, labels))
+    parts.append(header(1, "Amplifier", "EMG", "float32", RATE_HZ, labels))
     parts.append(header(2, "Box", "TTL", "int16", 0.0) if codes else header(2, "Markers", "Markers", "string", 0.0))
     times_s = 1000.0 + np.arange(len(emg_mv)) / RATE_HZ
     for first in range(0, len(emg_mv), 32):
