@@ -74,6 +74,8 @@ def test_an_imported_log_says_the_same_and_that_it_was_no_session(tmp_path: Path
     assert record.finished
     assert "Imported trials of P01" in str(record)
     assert not list(tmp_path.glob("*.part"))
+    with pytest.raises(LogError, match="never overwritten"):
+        analysis.to_log(tmp_path / "P01.mcap")
 
 
 def test_an_imported_log_cannot_go_on_and_no_trial_of_it_is_judged(tmp_path: Path) -> None:
@@ -87,13 +89,6 @@ def test_an_imported_log_cannot_go_on_and_no_trial_of_it_is_judged(tmp_path: Pat
     ):
         with pytest.raises(LogError, match="delivered without isiw"):
             refused()
-
-
-def test_a_log_that_is_there_is_not_replaced(tmp_path: Path) -> None:
-    analysis = isiw.analyse(*told(), space=SPACE, **FEW)
-    analysis.to_log(tmp_path / "P01.mcap")
-    with pytest.raises(LogError, match="never overwritten"):
-        analysis.to_log(tmp_path / "P01.mcap")
 
 
 @pytest.mark.slow

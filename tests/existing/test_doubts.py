@@ -44,7 +44,7 @@ def table(**more: Any) -> pd.DataFrame:
     return pd.DataFrame({"isi_ms": ISIS[order], "mep_mv": rng.uniform(0.1, 1.0, len(ISIS)).round(4), **cells})
 
 
-def of(kinds: list[str]) -> list[str]:
+def of(kinds: list[Any]) -> list[Any]:
     return (kinds * len(ISIS))[: len(ISIS)]
 
 
@@ -61,6 +61,14 @@ def renamed(**names: str) -> pd.DataFrame:
 def means(name: str, **beside: Any) -> pd.DataFrame:
     made = pd.DataFrame({"isi_ms": np.unique(ISIS), name: np.linspace(0.1, 0.9, 9)})
     return made.assign(**beside)
+
+
+MEAN_MV, SD_MV = table()["mep_mv"].mean(), table()["mep_mv"].std()
+MEANS_MV = table().groupby("isi_ms")["mep_mv"].mean().reset_index().to_numpy().round(4).tolist()
+
+
+def with_below(*rows: list[Any]) -> pd.DataFrame:
+    return pd.concat([table(), pd.DataFrame(rows, columns=["isi_ms", "mep_mv"])], ignore_index=True)
 
 
 ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
@@ -90,7 +98,8 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
                                       "means of several"),
     "means in one word": (renamed(mep_mv="mepmean"), {"columns": {"mep": "mepmean"}, "units": ("mV",)}, "means of"),
     **{name: (renamed(mep_mv=name), {"columns": {"mep": name}, "units": ("uV",)}, "relative")
-       for name in ("MEPnorm", "zMEP", "MEP (a.u.)", "MEP/control", "mep_x_baseline", "MEP fold change", "MEP_Mmax")},
+       for name in ("MEPnorm", "zMEP", "MEP (a.u.)", "MEP/control", "mep_x_baseline", "MEP fold change", "MEP_Mmax",
+                    "MEP residual", "predicted_mep", "dMEP", "MEP dB", "MEP - control", "MEP rank", "MEP^0.5")},
     "two units": (table().rename(columns={"mep_mv": "mep_mv (µV)"}), {}, "says two units; got 'uV and mV'"),
     "an ISI of 0 in many rows": (table().assign(isi_ms=np.where(ISIS > 60, ISIS, 0.0)), {}, "--alone 0 if they are"),
     "an ISI of -1": (table().assign(isi_ms=np.where(ISIS > 20, ISIS, -1.0)), {}, "--alone -1 if they are TMS alone"),
@@ -134,6 +143,23 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "a unit beside that changes": (renamed(isi_ms="ISI").assign(isi_unit=of(["s", "ms"])), {}, "says two units"),
     "latencies": (renamed(mep_mv="onset (ms)"), {"columns": {"mep": "onset (ms)"}, "units": ("mV",)}, "no amplitudes"),
     "ISIs in samples": (renamed(isi_ms="ISI (samples)"), {"units": ("ms",)}, "a unit of no ISIs; got 'samples'"),
+    "a mean that no word says": (with_below([ISIS.mean(), MEAN_MV]), {}, "seems to be a mean of rows above, or an SD"),
+    "a mean and an SD after an empty row": (with_below([None, None], [99, MEAN_MV], [51, SD_MV]).round(4), {},
+                                            "row 38 .* seems to be a mean"),
+    "means of each ISI after an empty row": (with_below([None, None], *MEANS_MV), {}, "row 38 .* seems to be a mean"),
+    "a mean in a column of words": (with_below([99, 0.4]).assign(label=[*of(["t"]), "Mean MEP (n=36)"]), {},
+                                    "row 37 of the column 'label' .* is none of a trial"),
+    "outliers that nothing is read of": (table(outlier_3sd=of([0, 0, 0, 1])), {}, '--column "exclude=outlier_3sd"; if'),
+    "trials that were used": (table(used=of(["x", "x", "x", ""])), {}, '--column "status=used"; if'),
+    "a status that is left empty": (table(valid=of(["yes", "yes", ""])), {}, "is empty, and others say yes"),
+    "ISIs below 0": (table().assign(isi_ms=np.where(ISIS > 20, -ISIS, 20)), {}, "most ISIs .* below 0.*got '32 of 36'"),
+    "numbers of rows out of order": (table().sort_values("isi_ms").reset_index(names=""), {}, "column 'index'"),
+    "blocks with the newest row first": (table(trial=range(36), block=of([1])).iloc[::-1], {}, "its column 'trial'"),
+    "a recruitment curve beside pairs": (table(mso=of([55])).assign(isi_ms=np.where(ISIS > 40, ISIS, np.nan),
+                                         mso=np.where(ISIS > 40, 55, ISIS.astype(int))), {"alone": ""},
+                                         "'mso'.*other intensities of TMS alone.*got '20, 40'.*--where \"mso=55"),
+    "a column for each ISI": (pd.DataFrame({f"{isi} ms": [0.1, 0.2] for isi in (20, 40)}), {}, "write a row for each"),
+    "two spellings of a code": (table(subject=of(["P07", "p-07"])), {}, "P07 differs .* only in case.*'p-07'"),
     "two columns of what is lost": (table(rejected=of([""]), artefact=of(["", "x"])), {}, "rejected or artefact"),
     "a value that is not there": (long("muscle", ["FCR", "FDI"]), {"where": {"muscle": "APB"}}, "one of FCR, FDI"),
 }  # fmt: skip
@@ -176,6 +202,38 @@ def test_what_was_asked_about_can_be_said() -> None:
     assert [one.subject for one in people] == ["AB", "CD"]
     (person,) = read_people(table().assign(isi_ms=np.linspace(810, 1900, 36)), Layout("impact", longest_isi_ms=2000.0))
     assert person.space().high_ms == 1900
+    flags, below = table(outlier=of([0, 0, 0, 1])), table().assign(isi_ms=np.where(ISIS > 60, -ISIS, ISIS))
+    for said, counted in (({"columns": {"exclude": "outlier"}}, 27), ({"where": {"outlier": "*"}}, 36)):
+        assert sum(trial.told for trial in read_people(flags, IMPACT.saying(**said))[0].trials) == counted
+    (person,) = read_people(below, IMPACT.saying(where={"isi_ms": "*"}))
+    assert sum(str(trial.reason) == "TMS before impact" for trial in person.trials) == 24
+
+
+PLAIN: dict[str, pd.DataFrame] = {
+    "empty rows between blocks": pd.concat([table()[:12], pd.DataFrame([{"isi_ms": None}]), table()[12:]]).assign(
+        mep_uv=lambda rows: (1e3 * rows["mep_mv"]).round()).drop(columns="mep_mv"),
+    "numbers of rows that begin again": pd.concat([table()[:18], table()[18:].reset_index(drop=True)]),
+    "numbers of trials in each block": table().assign(trial=[*range(18)] * 2, block=[1] * 18 + [2] * 18),
+    "a last trial that is like the mean": with_below([20, round(MEAN_MV, 4)]),
+    "yes and no of something else": table(response=np.where(ISIS > 60, 1, 0)),
+    "one intensity": table(mso=of([55]), rmt=of([46])),
+    "rows that are left out before": table()[3:],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", PLAIN)
+def test_a_plain_table_is_read_whatever_it_resembles(kind: str, tmp_path: Path) -> None:
+    PLAIN[kind].to_csv(tmp_path / "P01.csv", index=not kind.startswith("empty"))
+    expected = PLAIN[kind].dropna(subset="isi_ms")
+    for source in (tmp_path / "P01.csv", PLAIN[kind]):
+        (person,) = read_people(source, IMPACT)
+        assert [trial.isi_ms for trial in person.trials.told] == expected["isi_ms"].tolist()
+
+
+def test_numbers_of_trials_that_do_not_count_are_asked_about(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "P01.mat", {"isi_ms": ISIS, "mep_mv": table()["mep_mv"], "badTrials": [3, 7]})
+    with pytest.raises(IsiwError, match=r"'badTrials' is not as long as that of the ISIs.*got '?\[3, 7\]"):
+        read_people(tmp_path / "P01.mat", IMPACT)
 
 
 @pytest.mark.parametrize(
@@ -321,11 +379,16 @@ def test_epochs_about_the_tap_are_cut_at_the_pulse() -> None:
     )
 
 
-def test_rectified_emg_is_said(tmp_path: Path) -> None:
-    made = raw()
-    made.apply_function(np.abs, picks="all")
-    (person,) = read_people(made, KNOWN)
-    assert "as if it was rectified" in person.notes[0]
+@pytest.mark.parametrize("later_s", [0.01, -0.01, 0.025, 0.045])
+def test_sweeps_whose_time_0_is_not_at_the_pulse_are_asked_about(later_s: float) -> None:
+    silent = epochs().set_annotations(None)
+    with pytest.raises(IsiwError, match=r"most responses .* are not within 15–35 ms after the pulse.*mep_window_ms = "):
+        read_people(silent.shift_time(later_s), KNOWN)
+    if later_s == 0.01:
+        require_as_written(read_people(silent, KNOWN.saying(mep_window_ms=(20.0, 50.0)))[0])
+
+
+def test_emg_that_is_not_rectified_is_not_said_to_be(tmp_path: Path) -> None:
     made = raw()
     made.apply_function(lambda values: values + 2e-3, picks="all")  # an offset is none
     assert read_people(made, KNOWN)[0].notes == ()
@@ -374,16 +437,8 @@ def test_codes_of_triggers_that_overlap_are_told_apart_in_fif_and_in_bdf(tmp_pat
 
 def as_status(path: Path, values: np.ndarray) -> Path:
     """A BDF file as BioSemi writes it: EMG [µV], and codes in the lower bits of a channel called Status."""
-    count = values.shape[1] // int(RATE_HZ)
-    said: list[list[Any]] = [
-        ["FCR", "Status"],
-        ["", ""],
-        ["uV", "Boolean"],
-        [-8000, -8388608],
-        [8000, 8388607],
-        [-8388608] * 2,
-    ]
-    said += [[8388607] * 2, ["", ""], [int(RATE_HZ)] * 2, ["", ""]]
+    count, scales = values.shape[1] // int(RATE_HZ), [[-8000, -8388608], [8000, 8388607], [-8388608] * 2, [8388607] * 2]
+    said: list[Any] = [["FCR", "Status"], [""] * 2, ["uV", "Boolean"], *scales, [""] * 2, [int(RATE_HZ)] * 2, [""] * 2]
     sizes = [16, 80, 8, 8, 8, 8, 8, 80, 8, 32]
     top = [("BIOSEMI", 7), ("", 80), ("", 80), ("01.01.26", 8), ("10.00.00", 8), (768, 8), ("24BIT", 44), (count, 8)]
     top += [(1, 8), (2, 4), *((one, size) for each, size in zip(said, sizes, strict=True) for one in each)]
@@ -400,7 +455,7 @@ def test_a_trigger_whose_level_turns_at_each_stimulus_is_asked_about() -> None:
         read_people(with_stim(turns, "emg"), Layout(reference="impact", channels={"emg": "FCR", "pulse": "STI"}))
 
 
-@pytest.mark.parametrize("change", [lambda emg: np.abs(emg) - 0.02, lambda emg: -np.abs(emg)])
+@pytest.mark.parametrize("change", [np.abs, lambda emg: np.abs(emg) - 0.02, lambda emg: -np.abs(emg)])
 def test_rectified_emg_is_noticed_at_any_level_and_upside_down(change: Callable[[np.ndarray], np.ndarray]) -> None:
     made = raw()
     made.apply_function(lambda values: 1e-3 * change(1e3 * values), picks="all")

@@ -174,18 +174,12 @@ def test_a_table_of_spss_or_stata_has_the_units_and_words_of_its_labels(suffix: 
         read(tmp_path / f"P03{written}", layout)
 
 
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [
-        ("a.smrx", "In Spike2: File, Export"),
-        ("a.adicht", "In LabChart: File, Export"),
-        ("a.cfs", "In Signal: File, Exp"),
-    ],
-)
+@pytest.mark.parametrize(("name", "program"), [("a.smrx", "Spike2"), ("a.adicht", "LabChart"), ("a.cfs", "Signal")])
 def test_a_format_without_a_reader_says_which_export_to_make(
-    name: str, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, program: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / name).write_bytes(b"x")
+    says = f"In {program}: File, Export"
     monkeypatch.setitem(sys.modules, "biosig", None)
     with pytest.raises(IsiwError, match=says):
         read(tmp_path / name)
@@ -199,10 +193,8 @@ def cut(before_s: float = 0.4, after_s: float = 0.2) -> tuple[list[np.ndarray], 
     """Sweeps about the pulses [µV], and the events in each [s]."""
     emg_mv, _ = recording()
     pulses = [at_s for at_s, name in named_events() if name == "TMS"]
-    sweeps = [
-        1e3 * emg_mv[round((at_s - before_s) * RATE_HZ) :][: round((before_s + after_s) * RATE_HZ)] for at_s in pulses
-    ]
-    return sweeps, [
+    length, firsts = round((before_s + after_s) * RATE_HZ), [round((at_s - before_s) * RATE_HZ) for at_s in pulses]
+    return [1e3 * emg_mv[first:][:length] for first in firsts], [
         [(at - pulse + before_s, name) for at, name in named_events() if -before_s <= at - pulse < after_s]
         for pulse in pulses
     ]
@@ -212,11 +204,8 @@ def test_frames_of_signal_are_read_by_biosig_where_it_is(tmp_path: Path, monkeyp
     sweeps, events = cut()
     first_s = np.cumsum([0.0, *(len(sweep) / RATE_HZ for sweep in sweeps)])
     said = [{"TYP": "0x7ffe", "POS": float(at)} for at in first_s[:-1]]
-    said += [
-        {"TYP": "0x0001", "POS": float(begin + at), "Description": name}
-        for begin, each in zip(first_s, events, strict=False)
-        for at, name in each
-    ]
+    said += [{"TYP": "0x0001", "POS": float(begin + at), "Description": name}
+             for begin, each in zip(first_s, events, strict=False) for at, name in each]  # fmt: skip
     header = {"Samplingrate": RATE_HZ, "CHANNEL": [{"Label": "FCR", "PhysicalUnit": "uV"}], "EVENT": said}
     module = SimpleNamespace(header=lambda _: json.dumps(header), data=lambda _: np.concatenate(sweeps)[:, None])
     monkeypatch.setitem(sys.modules, "biosig", module)
@@ -226,13 +215,8 @@ def test_frames_of_signal_are_read_by_biosig_where_it_is(tmp_path: Path, monkeyp
 
 def test_labchart_is_read_by_adi_reader_on_windows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sweeps, events = cut()
-    channel = SimpleNamespace(
-        name="FCR",
-        n_records=len(sweeps),
-        units=["uV"] * 6,
-        fs=[RATE_HZ] * 6,
-        get_data=lambda record: sweeps[record - 1],
-    )
+    channel = SimpleNamespace(name="FCR", n_records=len(sweeps), units=["uV"] * 6, fs=[RATE_HZ] * 6,
+                              get_data=lambda record: sweeps[record - 1])  # fmt: skip
     records = [SimpleNamespace(comments=[SimpleNamespace(text=name, time=at) for at, name in each]) for each in events]
     held = SimpleNamespace(channels=[channel], records=records)
     monkeypatch.setitem(sys.modules, "adi", SimpleNamespace(read_file=lambda _: held))
@@ -270,13 +254,21 @@ FORMATS = [".xdf", ".acq", ".smr", ".nwb", ".sav", ".dta", ".set", ".edf", ".bdf
 
 @pytest.mark.parametrize("content", [b"", b"none of this format, and long enough to be something else" * 20])
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_a_file_that_is_none_of_its_format_is_refused_in_a_sentence(
-    suffix: str, content: bytes, tmp_path: Path
-) -> None:
+def test_a_file_that_is_none_of_its_format_is_refused_in_words(suffix: str, content: bytes, tmp_path: Path) -> None:
     (tmp_path / f"P01{suffix}").write_bytes(content)
     with pytest.raises(IsiwError, match=r"cannot be read|no data of EEGLAB|without a password") as refused:
         read(tmp_path / f"P01{suffix}")
     assert "\n" not in str(refused.value)
+
+
+def test_a_file_that_does_not_say_where_and_when_its_samples_are_is_asked_about(tmp_path: Path) -> None:
+    path = as_xdf(tmp_path)
+    path.write_bytes(path.read_bytes().replace(b"srate>4000<", b"srate>0000<"))
+    scipy.io.savemat(tmp_path / "P02.mat", {"data": ISIS_MS, "datastart": [1], "dataend": [5], "titles": ["EMG"]})
+    (tmp_path / "P03.txt").write_text("Interval=\t0.00025 s\nChannelTitle=\tEMG\tTMS\n0\t1\t2\n")
+    for name, says in (("P01.xdf", "at a rate"), ("P02.mat", "LabChart's channels"), ("P03.txt", "in a layout")):
+        with pytest.raises(IsiwError, match=says):
+            read(tmp_path / name, Layout("impact"))
 
 
 def test_of_a_folder_the_files_in_it_are_to_be_named(tmp_path: Path) -> None:

@@ -62,32 +62,25 @@ def test_the_sheet_with_trials_is_found_below_its_titles(tmp_path: Path) -> None
     assert [person.subject for person in read_people(tmp_path / "P01.xlsx", IMPACT)] == ["A1", "A2"]
 
 
-@pytest.mark.parametrize(
-    "beside",
-    ["Standardabweichung", "Std.-Abw. (mV)", "écart-type", "desviación estándar", "deviazione standard", "MEP SD (mV)",
-     "standaarddeviatie", "Nombre", "Aantal"],
-)  # fmt: skip
-def test_means_are_known_by_what_stands_beside_them(beside: str, tmp_path: Path) -> None:
-    with pytest.raises(IsiwError, match="means of several trials"):
-        read(table(tmp_path, f"ISI (ms);MEP (mV);{beside}", *pairs(12)))
+BESIDE = ("Standardabweichung", "Std.-Abw. (mV)", "écart-type", "desviación estándar", "deviazione standard",
+          "MEP SD (mV)", "standaarddeviatie", "Nombre", "Aantal")  # fmt: skip
+TITLES = ("Moyennes", "Promedios", "Medie", "Gemiddelden van 12 trials", "Mittelwerte")
+SUMS = ("Moyenne", "Promedio", "Media", "Gemiddelde", "Totale", "Teilergebnis", "Sous-total", "Mittelwert ± SD (n=8)")
+REMARKS = ("artéfact", "à rejeter", "artefacto", "da scartare", "ongeldig", "ungültig")
+ASKED: list[tuple[str, list[tuple[Any, ...]], str, str]] = [
+    *(("MEP (mV);" + beside, pairs(12), "", "means of several trials") for beside in BESIDE),
+    *(("MEP (mV)", pairs(), title, "means of several trials") for title in TITLES),
+    *(("MEP (mV);subject", [*pairs("A1"), (73, 0.4, word)], "", "is none of a trial") for word in SUMS),
+    *(("MEP (mV);nota", [*pairs(""), (200, 0.5, word)], "", "does not count") for word in REMARKS),
+]
 
 
-@pytest.mark.parametrize("title", ["Moyennes", "Promedios", "Medie", "Gemiddelden van 12 trials", "Mittelwerte"])
-def test_means_are_known_by_the_title(title: str, tmp_path: Path) -> None:
-    with pytest.raises(IsiwError, match="means of several trials"):
-        read(table(tmp_path, "ISI (ms);MEP (mV)", *pairs(), title=title))
-
-
-@pytest.mark.parametrize("word", ["Moyenne", "Promedio", "Media", "Gemiddelde", "Totale"])
-def test_a_row_of_a_sum_or_a_mean_is_none_of_a_trial(word: str, tmp_path: Path) -> None:
-    with pytest.raises(IsiwError, match="is none of a trial"):
-        read(table(tmp_path, "ISI (ms);MEP (mV);subject", *pairs("A1"), (73, 0.4, word)))
-
-
-@pytest.mark.parametrize("word", ["artéfact", "à rejeter", "artefacto", "da scartare", "ongeldig", "ungültig"])
-def test_a_remark_that_a_trial_does_not_count_is_asked_about(word: str, tmp_path: Path) -> None:
-    with pytest.raises(IsiwError, match="does not count"):
-        read(table(tmp_path, "ISI (ms);MEP (mV);nota", *pairs(""), (200, 0.5, word)))
+@pytest.mark.parametrize(("names", "rows", "title", "says"), ASKED)
+def test_what_is_no_table_of_single_trials_is_known_by_its_words(
+    names: str, rows: list[tuple[Any, ...]], title: str, says: str, tmp_path: Path
+) -> None:
+    with pytest.raises(IsiwError, match=says):
+        read(table(tmp_path, f"ISI (ms);{names}", *rows, title=title))
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +39,14 @@ def wide(columns: int) -> str:
     return f"isi_ms,mep_mv,{names}\n" + f"10,0.2,{','.join('1' * columns)}\n" * 3
 
 
+def beside(name: str, cells: Iterable[object]) -> str:
+    return f"isi_ms,mep_mv,{name}\n" + "".join(f"10,0.2,{cell}\n" for cell in cells)
+
+
+TRIALS = "has too many trials of one person and day; got 150; expected at most 100"
+VISITS = "has too many people and days; got 10; expected at most 5"
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -48,23 +56,11 @@ def wide(columns: int) -> str:
         (wide(60), "has too many columns; got 62; expected at most 50"),
         (wide(30) + f"10,0.2,{','.join('1' * 30)}\n" * 200, "has too many cells; got 6496; expected at most 2000"),
         (HEAD + "10,0.2\n" * 950, "has too many rows; got 950; expected at most 900"),
-        (HEAD + "10,0.2\n" * 150, "has too many trials of one person and day; got 150; expected at most 100"),
-        (
-            "isi_ms,mep_mv,date\n" + "10,0.2,2026-01-31\n" * 150,
-            "has too many trials of one person and day; got 150; expected at most 100",
-        ),
-        (
-            "isi_ms,mep_mv,subject\n" + "".join(f"10,0.2,P{number}\n" for number in range(10)),
-            "has too many people and days; got 10; expected at most 5",
-        ),
-        (
-            "isi_ms,mep_mv,day\n" + "".join(f"10,0.2,{number}\n" for number in range(1, 11)),
-            "has too many people and days; got 10; expected at most 5",
-        ),
-        (
-            "isi_ms,mep_mv,date\n" + "".join(f"10,0.2,2026-01-{number}\n" for number in range(11, 21)),
-            "has too many people and days; got 10; expected at most 5",
-        ),
+        (HEAD + "10,0.2\n" * 150, TRIALS),
+        (beside("date", ["2026-01-31"] * 150), TRIALS),
+        (beside("subject", range(10)), VISITS),
+        (beside("day", range(1, 11)), VISITS),
+        (beside("date", [f"2026-01-{number}" for number in range(11, 21)]), VISITS),
         ("a" * 1000, "has too long a line for its cells; got '1000 bytes'; expected at most 400 bytes"),
         ("a " * 100, "has too many columns; got 51; expected at most 50"),
         (f"isi_ms,mep_mv,{'n' * 50}\n10,0.2,1\n", "too long a name of a column; got '50 characters'"),

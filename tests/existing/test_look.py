@@ -39,11 +39,8 @@ def test_what_would_be_measured_is_drawn_once_nothing_but_the_reference_is_missi
     assert found.missing == "Do ISIs count from the impact (or electrical pulse), or the valve?"
     assert found.figure is not None
     titles = [axes.get_title(loc="left") for axes in found.figure.axes]
-    assert [title.split(",")[0] for title in titles] == [
-        "trial 0: ISI 30 ms",
-        "trial 1: ISI 60 ms",
-        "trial 2: ISI 90 ms",
-    ]
+    expected = [f"trial {number}: ISI {isi_ms} ms" for number, isi_ms in enumerate((30, 60, 90))]
+    assert [title.split(",")[0] for title in titles] == expected
     assert look(path, Layout("impact", channels={"emg": "FCR"}, unmarked="alone")).missing == ""
 
 

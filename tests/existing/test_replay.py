@@ -62,17 +62,18 @@ def test_a_replay_is_drawn(tmp_path: Path) -> None:
     assert replayed.plot(tmp_path / "replay.png").stat().st_size > 1000
 
 
-@pytest.mark.parametrize("isis_ms", [[10.0, np.nan], [10.0, 20.0, 30.0, 40.0]])
-def test_too_few_trials_are_refused(isis_ms: list[float]) -> None:
-    few = isiw.analyse(isis_ms, [0.1] * len(isis_ms), space=SPACE, **FEW).record.table
-    with pytest.raises(InvalidValueError, match=r"too few trials.*5 pairs and more"):
-        replay(Delivered(few, "impact"), space=SPACE)
-
-
-def test_trials_without_any_mep_are_no_answer_that_there_is_no_window() -> None:
-    silent = isiw.analyse([10.0, 20.0, 30.0, 40.0, 50.0], [0.0] * 5, space=SPACE, **FEW).record.table
-    with pytest.raises(InvalidValueError, match="No MEP was seen"):
-        replay(Delivered(silent, "impact"), space=SPACE)
+@pytest.mark.parametrize(
+    ("isis_ms", "mep_mv", "says"),
+    [
+        ([10.0, np.nan], 0.1, r"too few trials.*5 pairs and more"),
+        ([10.0, 20.0, 30.0, 40.0], 0.1, r"too few trials.*5 pairs and more"),
+        ([10.0, 20.0, 30.0, 40.0, 50.0], 0.0, "No MEP was seen"),
+    ],
+)
+def test_trials_that_answer_nothing_are_refused(isis_ms: list[float], mep_mv: float, says: str) -> None:
+    table = isiw.analyse(isis_ms, [mep_mv] * len(isis_ms), space=SPACE, **FEW).record.table
+    with pytest.raises(InvalidValueError, match=says):
+        replay(Delivered(table, "impact"), space=SPACE)
 
 
 def test_a_replay_of_few_trials_says_what_it_found_after_the_last() -> None:

@@ -44,6 +44,7 @@ def crossed_out(sheet: Any) -> None:
         (crossed_out, "1 row of the sheet 'Data' is crossed out; got 'row 7'"),
         (lambda sheet: setattr(sheet["A8"], "comment", openpyxl.comments.Comment("Artefakt!", "EK")),
          "1 row of the sheet 'Data' is left out by a note; got 'row 8'"),
+        (lambda sheet: sheet.merge_cells("A4:A6"), "1 row of the sheet 'Data' is merged with others; got 'row 4'"),
         (lambda sheet: sheet.__setitem__("B4", "=1/2"), "1 row .* without the result of a formula; got 'row 4'"),
     ],
 )  # fmt: skip
@@ -105,6 +106,10 @@ def test_a_rate_above_the_samples_or_beside_sweeps_is_compared_with_the_one_that
     sweeps = Layout("impact", rate_hz=2000.0, pulse_at_ms=9.0, units=("mV",), channels={"emg": "emg"})
     with pytest.raises(IsiwError, match=r"'interval' of P01\.mat says"):
         read_people(tmp_path / "P01.mat", sweeps)
+    waves = {name: {"values": trigger(name), "interval": 0.00025} for name in ("tap", "pulse")}
+    scipy.io.savemat(tmp_path / "P02.mat", {"emg": EMG_MV, **waves})
+    with pytest.raises(IsiwError, match=r"'tap\.interval' of P02\.mat says"):
+        read_people(tmp_path / "P02.mat", sweeps)
 
 
 def test_files_of_bids_beside_a_recording_that_contradict_it_are_asked_about(tmp_path: Path) -> None:

@@ -266,9 +266,8 @@ def test_days_are_numbers_in_their_names_or_are_counted(days: list[str], numbers
 
 
 def test_a_column_of_conditions_says_which_trials_are_tms_alone() -> None:
-    table = pd.DataFrame(
-        {"condition": ["paired", "single-pulse", "paired"], "isi_ms": [10, None, 20], "mep_mv": [0.1, 0.2, 0.3]}
-    )
+    kinds = ["paired", "single-pulse", "paired"]
+    table = pd.DataFrame({"condition": kinds, "isi_ms": [10, None, 20], "mep_mv": [0.1, 0.2, 0.3]})
     (person,) = read_people(table, IMPACT)
     assert [trial.is_control and trial.told for trial in person.trials] == [False, True, False]
 
@@ -321,6 +320,12 @@ BROKEN: dict[str, tuple[str, dict[str, Any], str]] = {
     "milliseconds in a column of seconds": ("isi_s,mep_mv\n10,0.1\n20,0.3\n30,0.2\n", {}, "--unit ms"),
     "millivolts in a column of microvolts": ("isi_ms,mep_uv\n10,0.1\n20,0.3\n30,0.2\n", {}, "--unit mV"),
     "bytes": ("\0\1\0\1\2\1\2", {}, "is no text"),
+    "an ISI that is empty": (HEAD + "single,.1\n,.9\n20,.2\n30,.3\n", {"alone": "single"}, "1 row has an amplitude"),
+    "names that pandas numbered": (HEAD[:-1] + ",mep_mv.1\n10,.1,.3\n20,.3,.4\n", {}, "mep; got 'mep_mv or mep_mv.1'"),
+    "a time between trials": ("Interval (s),Delay (ms),mep_mv\n4.9,10,.1\n4.8,20,.1\n", {}, "Interval .s. or Delay"),
+    "an intensity": ("isi_ms,Amplitude (V),p2p (mV)\n10,4.5,.1\n20,4.5,.1\n", {}, "Amplitude .V. or p2p"),
+    "two conditions": ("condition,isi_ms,mep_mv\ncontrol,10,0.1\ntest,20,0.3\ncontrol,40,0.5\n", {},
+                       "says TMS alone, and the ISI there is 10; got 'control'"),
     "one column": ("isi_ms mep_mv;\n10 0.1;\n", {}, "--column"),
 }  # fmt: skip
 
@@ -349,6 +354,7 @@ def test_a_file_that_is_not_there_or_is_an_older_workbook_is_refused(tmp_path: P
         ({"isi_ms": [-5.0, -10.0], "mep_mv": [0.1, 0.2]}, "TMS before impact"),
         ({"isi_ms": [5.0, 10.0], "mep_mv": [None, None]}, "outcome unknown"),
         ({"isi_ms": [5.0, 10.0], "mep_mv": [0.1, 0.2], "bad": [1, 1]}, "rejected"),
+        ({"isi_ms": [30.0] * 4, "mep_mv": [0.1, 0.2, 0.3, 0.4]}, "all the same"),
     ],
 )
 def test_why_no_trial_counts_is_said(table: dict[str, Any], says: str) -> None:
@@ -357,20 +363,9 @@ def test_why_no_trial_counts_is_said(table: dict[str, Any], says: str) -> None:
         person.space()
 
 
-def test_isis_that_are_all_the_same_make_no_space() -> None:
-    (person,) = read_people(pd.DataFrame({"isi_ms": [30.0] * 4, "mep_mv": [0.1, 0.2, 0.3, 0.4]}), IMPACT)
-    with pytest.raises(IsiwError, match="all the same"):
-        person.space()
-
-
 def test_tms_alone_has_its_intensity_where_it_is_not_that_of_all_pairs(tmp_path: Path) -> None:
-    table = pd.DataFrame(
-        {
-            "isi_ms": ["10", "TMS alone", "20", "TMS alone", "30"],
-            "mep_mv": [0.1, 0.2, 0.3, 0.9, 0.2],
-            "intensity_pct_rmt": [95, 95, 95, 120, 95],
-        }
-    )
+    isis_ms, pct_rmt = ["10", "TMS alone", "20", "TMS alone", "30"], [95, 95, 95, 120, 95]
+    table = pd.DataFrame({"isi_ms": isis_ms, "mep_mv": [0.1, 0.2, 0.3, 0.9, 0.2], "intensity_pct_rmt": pct_rmt})
     table.to_csv(tmp_path / "a.csv", index=False)
     (person,) = read_people(tmp_path / "a.csv", IMPACT)
     assert [trial.intensity_pct_rmt for trial in person.trials] == [None, None, None, 120.0, None]

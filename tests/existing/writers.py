@@ -107,10 +107,10 @@ def as_eeglab(path: Path) -> Path:
     return path / "P01.set"
 
 
-def with_stim(codes: np.ndarray, kind: str = "stim") -> Any:
+def with_stim(codes: np.ndarray | None = None, kind: str = "stim") -> Any:
     """The recording with a channel called STI in place of annotations."""
     info = mne.create_info(["FCR", "STI"], RATE_HZ, ["emg", kind])
-    return mne.io.RawArray(np.stack([1e-3 * recording()[0], codes]), info)
+    return mne.io.RawArray(np.stack([1e-3 * recording()[0], pulsed(8) if codes is None else codes]), info)
 
 
 def pulsed(width: int, name: str = "", high: float = 0.0) -> np.ndarray:

@@ -35,13 +35,10 @@ _BYTES_A_ROW: Final = 10  # a row of a table has hardly less
 _CHILD: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from isiw.existing.child import main; main()"
 """What the process runs: it finds what this one finds, and nothing in the folder in which it is started."""
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""Each thread of a library for matrices takes memory of its own."""
 ANSWER: Final = "answer.json"
 SAMPLES: Final = "samples.f8"
 
-_KINDS: Final[Mapping[str, type[IsiwError]]] = {
-    kind.__name__: kind for kind in (InvalidValueError, errors.ConfigError, errors.LogError)
-}
+_KINDS: Final = {one.__name__: one for one in (InvalidValueError, errors.ConfigError, errors.LogError)}
 
 
 class _Shown(str):
@@ -79,7 +76,8 @@ def write_answer(folder: Path, found: Answer, hashes: Mapping[str, str]) -> None
                     channels.append([number, trial, name, len(one.values), one.rate_hz, one.unit, one.t0_ms])
     people = [_person().model_construct(**vars(person)).model_dump_json() for person in found.people]
     shared = {"files": hashes, "unused": found.people[0].unused if found.people else ()}  # by all people of a file
-    _write(folder, {"people": people, "shared": shared, "channels": channels, "said": found.said})
+    values = {"people": people, "shared": shared, "channels": channels, "said": found.said}
+    (folder / ANSWER).write_text(json.dumps(values), encoding="ascii")
 
 
 def write_error(folder: Path, error: BaseException) -> None:
@@ -92,10 +90,6 @@ def write_error(folder: Path, error: BaseException) -> None:
     elif isinstance(error, OSError):
         name = None if error.filename is None else str(error.filename)
         values = {"system": [error.errno, error.strerror or str(error), name]}
-    _write(folder, values)
-
-
-def _write(folder: Path, values: Mapping[str, Any]) -> None:
     (folder / ANSWER).write_text(json.dumps(values), encoding="ascii")
 
 

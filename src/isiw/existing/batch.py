@@ -6,7 +6,7 @@ import json
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import isiw
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, InvalidValueError, LogError
-from isiw.existing.delivered import Delivered, codes_of
+from isiw.existing.delivered import Delivered, codes_of, spelt_otherwise
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
-from isiw.existing.reading import read_people
+from isiw.existing.reading import people_in
 from isiw.files import folded, hash_of, is_reserved
-from isiw.log.codes import is_same_person, spelling
 from isiw.log.places import log_exists
 from isiw.visit import Visit
 
@@ -74,13 +73,12 @@ def read_files(
 ) -> list[Person]:
     """The people of some files, and where their logs go: one log (.mcap), or a folder for a log of each."""
     everybody = [person for source in sources for person in _read(Path(source), way)]
-    every_code = dict.fromkeys(one.delivered.subject for one in everybody)
-    times = Counter(map(spelling, every_code))
-    people = [one._replace(refused=_spelt_otherwise(code, every_code) if times[spelling(code)] > 1 else None)
-              for one in everybody if only in {None, code := one.delivered.subject}]  # fmt: skip
+    why = spelt_otherwise(one.delivered.subject for one in everybody)
+    people = [one._replace(refused=why.get(code)) for one in everybody if only in {None, code := one.delivered.subject}]
     if only is not None and not people:
-        there = codes_of([one.delivered for one in everybody])
-        raise InvalidValueError("no person has this code", got=only, expected=there)
+        raise InvalidValueError(
+            "no person has this code", got=only, expected=codes_of([one.delivered for one in everybody])
+        )
     found = _placed(people, output)
     for person in found:
         if person.log is not None and person.refused is None and log_exists(person.log) and not is_there(person):
@@ -97,7 +95,7 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
         what = "the reference of the file is not that of the design space"
         remedy = "ISIs of one cannot be compared with those of the other: correct one of them."
         raise InvalidValueError(what, got=(layout.reference, way.space.reference), remedy=remedy)
-    for delivered in read_people(source, layout, subject=way.subject, limits=way.limits, also=way.also):
+    for delivered in people_in(source, layout, way.subject, way.limits, way.also):
         beside = {name: sha256 for name, sha256 in delivered.files.items() if name != source.name}
         digest = delivered.files.get(source.name) or (hash_of(source) if source.is_file() else "")
         own, simulated = delivered.visit, way.simulated or delivered.simulated
@@ -140,16 +138,7 @@ def code_in_names(subject: str) -> str:
     return re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", subject)).strip("._") or "unnamed"
 
 
-def _spelt_otherwise(code: str, codes: Iterable[str]) -> InvalidValueError:
-    """Why one person cannot be analysed as two."""
-    others = ", ".join(other for other in codes if other != code and is_same_person(code, other))
-    what = f"the code {code} differs from another one only in case, spaces, hyphens or underscores"
-    remedy = "For the same person write one code everywhere; for another, one that differs in more."
-    return InvalidValueError(what, got=others, remedy=remedy)
-
-
 def _no_log_of_its_own(stem: str, times: int) -> InvalidValueError | None:
-    """Why a person's log can have no such name; None if it can."""
     if times > 1:
         what = "two of the people or days would have one log, here or on other systems"
         remedy = "Give each a code, or a day, of their own, that differs in more than capitals."

@@ -15,15 +15,12 @@ from numbers import Real
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError
-from isiw.existing.layout import WORDS, plain, unit_named
+from isiw.existing.layout import ISI_UNITS_MS, WORDS, Layout, plain, unit_named
 from isiw.lazy import pd
 
 _NUMBER: Final = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
-_GROUPED: Final = {
-    ".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),
-    ",": re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?"),
-}
-"""By the decimal sign, numbers whose thousands are grouped by the other sign."""
+_GROUPED: Final = {".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),  # by the other sign than the decimal one
+                   ",": re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?")}  # fmt: skip
 _NUMBER_BEFORE: Final = re.compile(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*")
 _BLANKS: Final = re.compile(r"(?<=\d)[ '’\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}](?=\d{3})")
 _DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")
@@ -87,6 +84,7 @@ class Column:
     of: str = "the data"
     factor: float = 1.0  # that turns a number into ms, mV or µV
     of_codes: bool = False  # of people, who may be called NA
+    remedy: str = "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
 
     def number(self, row: int) -> float | None:
         """The number in a row [ms, mV or µV]; None if the cell is empty."""
@@ -95,9 +93,8 @@ class Column:
             return None
         value = _value(cell, self.decimal) if isinstance(cell, str) else _float(cell)
         if not math.isfinite(value):
-            usual = "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
             is_comma = isinstance(cell, str) and "," in cell and self.decimal != ","
-            remedy = "If the comma is a decimal sign, say --decimal ," if is_comma else usual
+            remedy = "If the comma is a decimal sign, say --decimal ," if is_comma else self.remedy
             raise self.refused(row, "is no number", remedy)
         return value if self.factor == 1.0 else value * self.factor
 
@@ -130,6 +127,12 @@ class Column:
         what = f"row {row + 1} of the column {self.name!r} of {self.of} {why}"
         return InvalidValueError(what, got=self.cells[row], remedy=remedy)
 
+    def doubted(self, why: str, got: object, remedy: str, expected: str | None = None) -> InvalidValueError:
+        """The error that a column cannot be read."""
+        return InvalidValueError(
+            f"the column {self.name!r} of {self.of} {why}", got=got, expected=expected, remedy=remedy
+        )
+
 
 def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str, Column]:
     """Columns with the decimal sign of each one's texts; one that may also group thousands is asked about."""
@@ -139,14 +142,16 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
     found = {}
     for key, column in columns.items():
         if stated is not None and signs[key] and stated not in signs[key]:
-            what = f"the column {column.name!r} of {column.of} has another decimal sign than the one that is stated"
             expected = f"{''.join(signs[key])!r}, as its numbers have"
-            raise InvalidValueError(what, got=stated, expected=expected, remedy="Leave --decimal out, or correct it.")
+            why, remedy = "has another decimal sign than the one that is stated", "Leave --decimal out, or correct it."
+            raise column.doubted(why, stated, remedy, expected)
         if usual is None and not signs[key] and (doubtful := _doubtful(column)):
             sign = "comma" if "," in doubtful else "point"
-            what = f"the {sign} in the column {column.name!r} of {column.of} may be a decimal sign, or group thousands"
-            remedy = "Say --decimal , or --decimal . to name the decimal sign."
-            raise InvalidValueError(what, got=doubtful, remedy=remedy)
+            why, remedy = (
+                f"has a {sign} that may be a decimal sign, or group thousands",
+                "Say --decimal , or --decimal .",
+            )
+            raise column.doubted(why, doubtful, remedy)
         found[key] = replace(column, decimal=max(signs[key], key=",.".find, default=usual or "."))
     return found
 
@@ -155,9 +160,8 @@ def _signs(column: Column) -> set[str]:
     """The decimal signs that texts of a column have for certain."""
     found = set[str]()
     for text in {cell for cell in column.cells if isinstance(cell, str) and not {*cell}.isdisjoint(".,")}:
-        numbers = {sign: _value(text, sign) for sign in ".,"}
-        found |= {sign for sign, number in numbers.items() if sign in text and not math.isnan(number)
-                  and math.isnan(numbers["," if sign == "." else "."])}  # fmt: skip
+        fitting = {sign for sign in ".," if not math.isnan(_value(text, sign))}
+        found |= fitting & {*text} if len(fitting) == 1 else set()
     return found
 
 
@@ -167,6 +171,18 @@ def _doubtful(column: Column) -> str | None:
     doubtful = [text for text in texts if any(grouped.fullmatch(text) for grouped in _GROUPED.values())]
     are_asked = bool(doubtful) and ("," in doubtful[0] or any(text.isdigit() for text in texts))
     return doubtful[0] if are_asked else None
+
+
+def required_unit(layout: Layout, known: Mapping[str, float], said: str | None, what: str, got: str | None) -> str:
+    """The unit of something: the one that is stated, or else the one that the file says."""
+    unit = layout.unit_of(known) or said
+    if unit is None or unit not in known:
+        units, what = (
+            "ms or s" if known is ISI_UNITS_MS else "mV, uV or V",
+            f"the unit of {what} is not stated or unknown",
+        )
+        raise InvalidValueError(what, got=got, remedy=f"Say --unit with {units}.")
+    return unit
 
 
 def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:

@@ -21,7 +21,7 @@ from isiw.errors import ConfigError, InvalidValueError
 from isiw.existing import formats
 from isiw.existing.apart import Answer, write_answer, write_error
 from isiw.existing.layout import Layout
-from isiw.existing.limits import ReadingLimits, limit_memory, limit_time, seconds_for
+from isiw.existing.limits import ReadingLimits, limit, seconds_for
 from isiw.existing.look import seen_in
 from isiw.existing.reading import contents_in, people_of_contents
 from isiw.files import hash_of
@@ -50,19 +50,17 @@ def _answer(request: Mapping[str, Any], folder: Path) -> None:
     layout = checked(Layout, request["layout"], "the layout")
     own = _load_libraries(path)
     csv.field_size_limit(2**31 - 1)  # a cell that is too long is refused in words later
-    limit_memory(limits.memory_mb)
-    limit_time(seconds_for(limits, path, table=formats.format_of(path).is_table))
+    limit("DATA", 1e6 * limits.memory_mb)
+    limit("CPU", seconds_for(limits, path, table=formats.format_of(path).is_table))
     gate = Gate(path, [Path(other) for other in request["also"]], own)
     sys.addaudithook(gate)
     try:
         require_no_links(path)
         contents = contents_in(path, layout, limits)
         if contents.trials is not None:  # for so many rows, of which trials are made, there is more time
-            limit_time(seconds_for(limits, path, table=True, rows=len(contents.trials)))
-        if request["look"]:
-            found = seen_in(contents, path, layout, limits)
-        else:
-            found = Answer(people_of_contents(contents, path, layout, request["subject"], limits), {})
+            limit("CPU", seconds_for(limits, path, table=True, rows=len(contents.trials)))
+        people = [] if request["look"] else people_of_contents(contents, path, layout, request["subject"], limits)
+        found = seen_in(contents, path, layout, limits) if request["look"] else Answer(people, {})
     finally:
         gate.require_nothing_refused()
     write_answer(folder, found, gate.hashes())

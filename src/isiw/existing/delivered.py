@@ -5,7 +5,8 @@ from __future__ import annotations
 import datetime as dt
 import math
 import statistics
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, NoReturn
@@ -16,6 +17,7 @@ from isiw.design import MOST_ISIS, DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
+from isiw.log.codes import spelling
 from isiw.log.continuing import require_search
 from isiw.signals.limits import SignalLimits
 from isiw.signals.plausible import implausible_scale
@@ -80,8 +82,7 @@ class Delivered:
             what = f"{self.named} has no pair of stimuli"
             raise InvalidValueError(what, remedy="Which column holds the ISIs, or which marker is of the tap?")
         judged = [trial for trial in self.trials if trial.told or trial.reason is Kind.IMPLAUSIBLE]
-        meps_mv = [trial.mep_mv for trial in judged if trial.mep_mv is not None]
-        self._require_units(isis_ms, meps_mv)
+        self._require_units(isis_ms, [trial.mep_mv for trial in judged if trial.mep_mv is not None])
 
     @property
     def named(self) -> str:
@@ -131,11 +132,9 @@ class Delivered:
 
     def _refuse_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> NoReturn:
         said = f"If they are in {fits[0]}, say --unit {fits[0]}; if" if fits else "If"
-        other = f"column holds them, say --column {key}=NAME"
-        if self.sweeps:
-            other = "channel holds the EMG, say --channel emg=NAME"
+        other = "channel holds the EMG, say --channel emg" if self.sweeps else f"column holds them, say --column {key}"
         what = f"the {what} of {self.named} cannot be in {stated}"
-        raise InvalidValueError(what, got=got, remedy=f"{said} another {other}.")
+        raise InvalidValueError(what, got=got, remedy=f"{said} another {other}=NAME.")
 
 
 def anywhere(reference: Reference) -> DesignSpace:
@@ -171,6 +170,17 @@ def read_log(path: str | Path) -> Delivered:
 def renumbered(trials: Sequence[Trial]) -> TrialTable:
     """Trials as a table, numbered from 0 on."""
     return TrialTable(tuple(one if one.index == n else replace(one, index=n) for n, one in enumerate(trials)))
+
+
+def spelt_otherwise(codes: Iterable[str]) -> dict[str, InvalidValueError]:
+    """By codes that are spellings of one, why nobody can be analysed as two people."""
+    alike = defaultdict[str, set[str]](set)
+    for code in codes:
+        alike[spelling(code)].add(code)
+    remedy = "For the same person write one code everywhere; for another, one that differs in more."
+    only = "differs from another one only in case, spaces, hyphens or underscores"
+    return {code: InvalidValueError(f"the code {code} {only}", got=", ".join(sorted(group - {code})), remedy=remedy)
+            for group in alike.values() if len(group) > 1 for code in sorted(group)}  # fmt: skip
 
 
 def codes_of(people: Sequence[Delivered]) -> str:

@@ -6,9 +6,11 @@ import math
 import re
 import statistics
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
-from itertools import groupby
+from itertools import chain, groupby, pairwise
+from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,7 +18,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import LONGEST_ISI_MS, Delivered
-from isiw.existing.layout import WORDS, Layout, letters, plain
+from isiw.existing.layout import COLUMNS, WORDS, Layout, letters, plain
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
@@ -31,15 +33,17 @@ _MEANS: Final = re.compile(
 )
 _TITLES: Final = re.compile(
     r"\b(means?|averages?|averaged|avg|mittelwerte?|moyennes?|promedios?|medi[ae]|gemiddelden?)\b"
-)
-"""What the names of files and sheets, and titles, say of means."""
-_ORIGINS: Final = {"impact": r"\b(valve|ventil|command)", "valve": r"\b(impact|hit|contact|aufprall)"}
-"""What the name of ISIs that count from another event says."""
+)  # what the names of files and sheets, and titles, say of means
+_ORIGINS: Final = {
+    "impact": r"\b(valve|ventil|command)",
+    "valve": r"\b(impact|hit|contact|aufprall)",
+}  # from another event
 _BASES: Final = "(control|base|baseline|mean|unconditioned|kontrolle)"
 _RELATIVE: Final = re.compile(
     r"%|\bper ?c(ent)?|\bpct\b|pro[zc]ent|p(our|or)cent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|"
     r"\brel(ati\w*)?\b|\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|"
-    r"\bdelta\b|[δΔ]|\bdiff|\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|[/÷] *mep\b|"
+    r"\bdelta\b|\bd mep\b|[δΔ]|\bdiff|\bminus\b|mep +- |\bdb\b|\brank|[\^√]|\bresid|fitted|predict|smooth|winsor|"
+    r"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|[/÷] *mep\b|"
     rf"([/÷]|\b(x|times|div|by|vs)\b) ?{_BASES}\b"
 )
 _MEASURES: Final = (
@@ -50,23 +54,22 @@ _OTHERWISE: Final = (
     ("mep", _RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
     ("mep", _MEASURES, "are of another measure", "amplitudes from peak to peak"),
     ("mep", r"\bgain\b|amplified|verstärk", "are multiplied", "amplitudes at the electrodes"),
-    ("isi", r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe)\b",
+    ("isi", r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe|rank|log\d*|ln|z)\b",
      "are numbers of something", "the intervals themselves, in ms or s"),
-)  # fmt: skip
-"""What the name of a column says of its numbers if they are no amplitudes or ISIs, and what is expected."""
+)  # fmt: skip # what a column's name says of numbers that are no amplitudes or ISIs, and what is expected
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
-_FEW: Final = 3
-_WORDS: Final = 4  # in a longer remark a word such as bad may be of something else
+_INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
+_NUMBER: Final = re.compile(r"[-.,]*\d[\d.,]*")
+_FEW, _BELOW = 3, 50  # so many rows at most are below the trials
+_CODE, _WORDS = 4, 4  # a shorter text in rows that follow may be initials; in a longer remark bad may be of something
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
-_FEWEST: Final = 12  # in a table with fewer rows ISIs may come again by chance
-_SHARED: Final = 0.8
+_FEWEST, _SHARED = 12, 0.8  # in a table with fewer rows ISIs may come again by chance
 _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
 
 def _words(name: str) -> str:
     """A name in lower case, its words apart; units such as mV are one."""
-    apart = re.sub(r"(?<=[a-z]{2})(?=[A-Z])", " ", name.replace("_", " ")).casefold()
-    return re.sub("mep(?!s)", " mep ", apart)
+    return re.sub("mep(?!s)", " mep ", re.sub(r"(?<=[a-z]{2})(?=[A-Z])", " ", name.replace("_", " ")).casefold())
 
 
 def doubtful_words(text: str) -> list[str]:
@@ -86,17 +89,19 @@ def require_of_kind(key: str, what: str, name: str, source: str) -> None:
 def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source: str) -> None:
     """Raise if rows are means of several trials: their column says so, or their SDs or numbers are beside them."""
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
-    spreads = [name for name in others if _is_spread(name)]
+    spreads = [name for name in others if _says(name, WORDS["spreads"])]
     numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in WORDS["numbers"]}
-    whole = {name: all(text.isdigit() and int(text) > 1 for text in texts) for name, texts in numbers.items()}
-    counted_in = [name for name, texts in numbers.items() if whole[name] and 2 * len({*texts}) <= len(texts)]
+    counted_in = [name for name, texts in numbers.items() if 2 * len({*texts}) <= len(texts)
+                  and all(text.isdigit() and int(text) > 1 for text in texts)]  # fmt: skip
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
     rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
     once = len(rows) > 2 and len({*rows}) == len(rows)
+    known = WORDS["spreads"] | WORDS["sums"] | WORDS["means"]
     for name, cells in others.items():
         for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
-            word = odd.strip().rstrip(":").casefold()
-            if word in WORDS["spreads"] | WORDS["sums"] or _MEANS.fullmatch(word):
+            if _says(odd, known) and not (
+                len(odd) < _CODE and any(one == other == odd for one, other in pairwise(cells))
+            ):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
     title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
@@ -109,18 +114,35 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
         raise InvalidValueError(what, expected=expected, remedy=remedy)
 
 
-def _is_spread(name: str) -> bool:
-    words = [word for word in re.findall(r"\w+", _words(name)) if word not in WORDS["beside spreads"]]
-    return bool(words) and ({*words} <= WORDS["spreads"] or "".join(words) in WORDS["spreads"])
+def _says(text: str, known: AbstractSet[str]) -> bool:
+    """True if a text, besides what stands in brackets, has words of a kind alone, such as SD (mV) or Mean (n = 8)."""
+    bare = re.sub(r"[\[(].*?[\])]|\bn ?= ?\d+", " ", _words(text))
+    words = [word for word in re.findall(r"\w+", bare) if word not in WORDS["beside spreads"]]
+    return bool(words) and ({*words} <= known or "".join(words) in known)
 
 
-def require_no_verdicts(beside: Iterable[Column]) -> None:
-    """Raise if a column of which nothing is read says that a trial does not count."""
+def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> None:
+    """Raise if a column of which nothing is read says that a trial does not count, in its cells or by its name."""
     for column in beside:
-        texts = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
-        if (odd := next(filter(_is_verdict, texts), None)) is not None:
+        key = key_of_flags(column.name)
+        texts = [*map(str.casefold, column.texts)] if key and column.name not in where else []
+        kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
+        odd = [row for row, text in enumerate(texts) if text in kinds]
+        are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
+        if are_flags and 0 < len(odd) < len(texts):
+            remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
+            raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
+        remarks = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
+        if (remark := next(filter(_is_verdict, remarks), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
-            raise column.refused(column.cells.index(odd), "says that the trial does not count", remedy)
+            raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
+
+
+def key_of_flags(name: str) -> str | None:
+    """What a column would hold whose name has a word of trials that do not count, or of those that do."""
+    words = {*re.findall(r"[^\W\d_]+", _words(name))}
+    kinds = {"exclude": WORDS["left out"] | WORDS["flags"], "status": WORDS["counted"]}
+    return next((key for key, known in kinds.items() if words & (known | {*COLUMNS[key]})), None)
 
 
 def _is_verdict(text: str) -> bool:
@@ -129,23 +151,54 @@ def _is_verdict(text: str) -> bool:
     return not words.isdisjoint(WORDS["left out"]) and words.isdisjoint(WORDS["no"])
 
 
+def require_no_summaries(columns: Columns, apart: int | None) -> None:
+    """Raise if rows from one `apart` on, or with more digits than others, are by their numbers means or SDs."""
+    isi, mep = columns["isi"], columns["mep"]
+    numbers = {row: number for row in columns.rows if (number := mep.number(row)) is not None}
+    known, meps = [*numbers], np.array([*numbers.values()]) / mep.factor
+    texts = [isi.texts[row].replace(isi.decimal, ".") for row in known]
+    isis = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce").to_numpy(dtype=np.float64)
+    digits = [len(mep.texts[row].partition(mep.decimal)[2]) for row in known]
+    below = next((n for n, row in enumerate(known) if apart is not None and row >= apart), len(known))
+    for begin in sorted(
+        {max(below, len(known) - _BELOW), *range(max(len(known) - _FEW, 0), len(known))} - {len(known)}
+    ):
+        above, of_isis = meps[:begin], isis[:begin]
+        agree = [_is_summary(meps[n], digits[n], above, above[of_isis == isis[n]]) for n in range(begin, len(known))]
+        if len(above) < _FEW or columns["order"].text(known[begin]) or 2 * sum(agree) <= len(agree):
+            continue
+        finer = digits[begin] > max(digits[:begin]) or np.isclose(isis[begin], np.nanmean(of_isis), rtol=1e-3)
+        if below == begin or (finer and agree[0]):
+            remedy = "Delete the rows below the trials; if these are trials, number all in a column called trial."
+            raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", remedy)
+
+
+def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
+    """True if a number is, as far as its digits say, a mean or median of others, their SD, or its standard error."""
+    slack, of = max(0.51 * 10.0**-digits, 1e-9 * abs(number)), [group for group in groups if len(group) > 1]
+    sds = [(sd := float(np.std(group, ddof=one)), sd / len(group) ** 0.5) for group in of for one in (0, 1)]
+    means = [each for group in of for each in (np.mean(group), np.median(group))]
+    return number not in groups[0] and any(abs(each - number) <= slack for each in (*means, *chain(*sds)))
+
+
 def require_reference(isi: Column, reference: Reference | None) -> None:
     """Raise if the name of ISIs says that they count from another event than the one that is stated."""
     if reference is not None and (found := re.search(_ORIGINS[reference], _words(isi.name))):
-        what = f"the column {isi.name!r} of {isi.of} counts from another event than is stated"
         remedy = "Correct --reference, or name the column of the other ISIs: --column isi=NAME."
-        raise InvalidValueError(what, got=reference, expected=f"what {found[0]!r} says", remedy=remedy)
+        raise isi.doubted("counts from another event than is stated", reference, remedy, f"what {found[0]!r} says")
 
 
 def require_short(delivered: Delivered, layout: Layout) -> None:
     """Raise if most ISIs are longer than those after which the effect of a tap is sought."""
     usual_ms = statistics.median(trial.isi_ms for trial in delivered.trials if trial.isi_ms is not None)
     if usual_ms > layout.longest_isi_ms:
-        what, got = f"the ISIs of {delivered.source} are longer than those of paired stimulation", f"{usual_ms:g} ms"
-        remedy = "Are they in another unit (--unit), or numbers of samples, or times between trials? If they are "
-        remedy += "right, write longest_isi_ms = NUMBER into a layout."
-        expected = f"at most {layout.longest_isi_ms:g} ms"
-        raise InvalidValueError(what, got=f"{got} in the median", expected=expected, remedy=remedy)
+        what = f"the ISIs of {delivered.source} are longer than those of paired stimulation"
+        remedy = (
+            "Are they in another unit (--unit), or numbers of samples, or times between trials? If they are right, "
+        )
+        got, expected = f"{usual_ms:g} ms in the median", f"at most {layout.longest_isi_ms:g} ms"
+        remedy += "write longest_isi_ms = NUMBER into a layout."
+        raise InvalidValueError(what, got=got, expected=expected, remedy=remedy)
 
 
 def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
@@ -162,7 +215,7 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 def require_one_kind_each(columns: Columns) -> None:
     """Raise if rows are not of one person's single trials of one muscle, in their order and in one unit."""
     for doubt in (_require_ascending, require_said, _require_one_kind, _require_isis, _require_one_unit,
-                  _require_whole_blocks, _require_one_row_each):  # fmt: skip
+                  _require_one_intensity, _require_one_row_each):  # fmt: skip
         doubt(columns)
 
 
@@ -176,36 +229,38 @@ def require_codes(columns: Columns) -> None:
         if text.upper() == "NA" and others and not initials:
             remedy = "If NA is a person's code, write another one, such as N.A.; if the code is missing, fill it in."
             raise subject.refused(row, "may be a code, or stand for none", remedy)
-    if any(texts.values()) and "" in texts.values():
-        row = next(row for row, text in texts.items() if not text)
-        raise subject.refused(row, "is empty", "Write the person's code into each row.")
+    if empty := [row for row, text in texts.items() if not text and any(texts.values())]:
+        raise subject.refused(empty[0], "is empty", "Write the person's code into each row.")
 
 
 def _require_ascending(columns: Columns) -> None:
-    """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
-    if (order := columns.of.get("order") or columns.of.get("date")) is None or "block" in columns.of:
+    """Raise if rows are not in the order of delivery, on which drift and the start depend, or a block comes back."""
+    block, seen = columns["block"], set[str]()
+    for text, rows in groupby(columns.rows if block.name not in columns.layout.where else (), block.text):
+        if text and text in seen:
+            remedy = f'If it tells muscles apart, say --where "{block.name}={text}", or --where "{block.name}={ALL}".'
+            raise block.refused(next(rows), "comes back after another block", remedy)
+        seen.add(text)
+    if (order := columns.of.get("order") or columns.of.get("date")) is None:
         return
     order = replace(order, decimal=columns["isi"].decimal)
     known = {row: text for row in columns.rows if (text := order.text(row))}
-    odd = [row for row, text in known.items() if order.name == columns["date"].name or not _is_number(text)]
+    odd = [row for row, text in known.items() if order.name == columns["date"].name or not _NUMBER.fullmatch(text)]
     if 0 < len(odd) < len(known):
         raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
     places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
-    if places != sorted(places):
+    pairs = zip(map(block.text, known), places, strict=False)
+    in_blocks = [[*each] for _, each in groupby(pairs, itemgetter(0))]
+    if any(each != sorted(each) for each in in_blocks):
         what = f"the rows of {order.of} are not in the order of its column {order.name!r}"
         remedy = "Sort them as the trials were delivered, or name the column that says so: --column order=NAME."
         raise InvalidValueError(what, remedy=remedy)
-    times = Counter(places)
-    repeated = next((text for text, place in zip(known.values(), places, strict=False) if times[place] > 1), None)
-    if "order" in columns.of and not odd and repeated is not None:
+    twice = [place for each in in_blocks for (_, before), (_, place) in pairwise(each) if before == place]
+    if "order" in columns.of and not odd and twice:
         what = f"a trial has two rows and more in {order.of}, by its column {order.name!r}"
-        remedy = 'Leave one row for each trial, such as that of one muscle: --where "muscle=FCR"; or name a column of '
-        remedy += "people or blocks: --column subject=NAME, --column block=NAME."
-        raise InvalidValueError(what, got=repeated, remedy=remedy)
-
-
-def _is_number(text: str) -> bool:
-    return re.sub("[.,]", "", text).lstrip("-").isdigit()
+        remedy = 'Leave one row for each trial, such as that of a muscle: --where "muscle=FCR"; or say --column '
+        remedy += "subject=NAME of people, or --column block=NAME of blocks."
+        raise InvalidValueError(what, got=f"{twice[0]:g}", remedy=remedy)
 
 
 def require_said(columns: Columns) -> None:
@@ -214,15 +269,18 @@ def require_said(columns: Columns) -> None:
     one_word = len({*map(plain, map(condition.text, columns.rows))}) == 1  # in all rows it means nothing
     for row in paired if columns.layout.alone is None else ():
         if (by := columns.called_alone(row)) is not None and not (by is condition and one_word):
-            remedy = "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it "
-            remedy += "is a pair, rename the column."
+            remedy = "If it is TMS alone, leave its ISI empty, or say --alone with it; if a pair, rename the column."
             raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
+    said = [columns["status"].flag(row) for row in columns.rows if "status" in columns.of]
+    if {*said} == {None, True}:
+        row = columns.rows[said.index(None)]
+        raise columns["status"].refused(row, "is empty, and others say yes", "Write yes or no into each row.")
     empty = [row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None]
     empty = [row for row in empty if "mep" not in columns.of or columns["mep"].number(row) is not None]
     if empty and "asked" not in columns.of:
         what = f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}"
         remedy = "If these are TMS alone, say --alone with what stands in their place, or --alone '' for an empty "
-        remedy += "cell; if not, mark them in a column called exclude."
+        remedy += "cell; if not, write their ISIs, or mark them in a column called exclude."
         raise InvalidValueError(what, got=f"row {empty[0] + 1}", remedy=remedy)
 
 
@@ -232,7 +290,7 @@ def _require_one_kind(columns: Columns) -> None:
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
     for name, column in columns.beside.items():
         texts = [text for _, row in by_isi if (text := column.text(row))]
-        are_words = not any(map(_is_number, texts))
+        are_words = not any(map(_NUMBER.fullmatch, texts))
         kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
         if name in columns.layout.where or len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
             continue
@@ -244,23 +302,27 @@ def _require_one_kind(columns: Columns) -> None:
         shares = [len(kinds.keys() & {*each}) / len(kinds) for each in bins]
         if sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins):
             few = ", ".join(list(kinds)[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
-            what = f"the column {name!r} of {isi.of} has several values at each ISI, and nothing is read of it"
             remedy = f'Say --where "{name}={next(iter(kinds))}" for one of them, --where "{name}={ALL}" if all are to '
             remedy += f'be analysed together, or --column "subject={name}" if they are people.'
-            raise InvalidValueError(what, got=few, remedy=remedy)
+            raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
 
 
 def _require_isis(columns: Columns) -> None:
     """Raise if one number among the ISIs is so frequent, or so far from the others, that it may stand for TMS alone."""
     isi, paired = columns["isi"], columns.paired
+    isis_ms = [isi.number(row) for row in paired]
+    before = [isi_ms for isi_ms in isis_ms if (isi_ms or 0.0) < 0]
+    if len({*before}) > 1 and 2 * len(before) > len(paired) > 2 and isi.name not in columns.layout.where:
+        what = f"most ISIs of {isi.of} are below 0, as if the pulse came before the tap"
+        remedy = "If the tap came first, write them without the sign; if not, so that these trials do not count, say "
+        remedy += f'--where "{isi.name}={ALL}".'
+        raise InvalidValueError(what, got=f"{len(before)} of {len(paired)}", remedy=remedy)
     if columns.layout.alone is not None or len(paired) < len(columns.rows):
         return
-    isis_ms = [isi.number(row) for row in paired]
     numbered = any(isis_ms == list(range(first, first + len(paired))) for first in (0, 1))
     if "order" not in columns.of and len(paired) >= _FEWEST and numbered:
         what = f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows"
-        remedy = "Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called "
-        remedy += "trial."
+        remedy = "Name that of the ISIs: --column isi=NAME; if these are, number the rows in a column called trial."
         raise InvalidValueError(what, remedy=remedy)
     times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
     for odd in {min(times, default=0.0), max(times, default=0.0)}:
@@ -274,13 +336,27 @@ def _require_isis(columns: Columns) -> None:
             raise InvalidValueError(what, expected="what an ISI is, and what is TMS alone", remedy=remedy)
 
 
+def _require_one_intensity(columns: Columns) -> None:
+    """Raise if TMS alone had other intensities than pairs by a column that is not used, so that it is no baseline."""
+    for name, column in columns.beside.items():
+        rows = columns.rows if name not in columns.layout.where and _INTENSITY.search(_words(name)) else ()
+        of_pairs = {text: None for row in columns.paired if rows and (text := column.text(row))}
+        others = dict.fromkeys(text for row in rows if (text := column.text(row)) not in {"", *of_pairs})
+        if of_pairs and others:
+            remedy = (
+                f'Say --where "{name}={next(iter(of_pairs))}", or name a column in % of the resting motor threshold '
+            )
+            remedy += f'by --column intensity=NAME; to analyse all together, say --where "{name}={ALL}".'
+            raise column.doubted("says other intensities of TMS alone than of pairs", ", ".join([*others][:5]), remedy)
+
+
 def _is_named(columns: Columns, isi_ms: float) -> bool:
     """True if a column that is not used has a word for the rows with one ISI that no other row has."""
-    has = {row: columns["isi"].number(row) == isi_ms for row in columns.rows}
+    of_isi = {row for row in columns.rows if columns["isi"].number(row) == isi_ms}
     for column in columns.beside.values():
-        words, others = ({column.text(row) for row in has if has[row] is of_isi} for of_isi in (True, False))
-        if len(words) == 1 and words.isdisjoint(others) and not next(iter(words)).isdigit():
-            return True
+        words = {column.text(row) for row in of_isi}
+        if len(words) == 1 and words.isdisjoint(column.text(row) for row in {*columns.rows} - of_isi):
+            return not next(iter(words)).isdigit()
     return False
 
 
@@ -299,19 +375,8 @@ def _require_one_unit(columns: Columns) -> None:
         if min(len(low), len(high)) < _FEW or not (low[-1] < least or high[0] > most) or high[0] < 8 * low[-1]:
             continue
         if 300 < np.median(high) / np.median(low) < 3000:
-            what = f"the column {column.name!r} of {column.of} seems to be in two units"
             got = f"{len(low)} up to {low[-1] / column.factor:g} and {len(high)} from {high[0] / column.factor:g} on"
-            raise InvalidValueError(what, got=got, remedy="Write all of them in one.")
-
-
-def _require_whole_blocks(columns: Columns) -> None:
-    """Raise if a block comes back after another one, as muscles do."""
-    block, seen = columns["block"], set[str]()
-    for text, rows in groupby(columns.rows if block.name not in columns.layout.where else (), block.text):
-        if text and text in seen:
-            remedy = f'If it tells muscles apart, say --where "{block.name}={text}", or --where "{block.name}={ALL}".'
-            raise block.refused(next(rows), "comes back after another block", remedy)
-        seen.add(text)
+            raise column.doubted("seems to be in two units", got, "Write all of them in one.")
 
 
 def _require_one_row_each(columns: Columns) -> None:
@@ -328,8 +393,6 @@ def _require_one_row_each(columns: Columns) -> None:
     times_of_four = Counter(rows for rows in four if len({mep for _, mep in rows}) == 4)
     again |= max(times_of_four.values(), default=0) > 1  # nor four trials in a row
     if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
-        what = f"the ISIs of {isi.of} come {max(times, 2)} times each, as if there was a row for each of several "
-        what += "muscles, or each row twice"
+        what = f"the ISIs of {isi.of} come {max(times, 2)} times each, as if muscles had a row each, or each row twice"
         remedy = "Leave one row for each trial; if each row is one, number them in a column called trial."
-        got = ", ".join(texts[: 2 * max(times, 2)])
-        raise InvalidValueError(what, got=got, remedy=remedy)
+        raise InvalidValueError(what, got=", ".join(texts[: 2 * max(times, 2)]), remedy=remedy)

@@ -16,7 +16,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
-from isiw.existing.doubts import doubtful_words
+from isiw.existing.doubts import doubtful_words, key_of_flags
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, WORDS, Layout, letters, unit_named
 from isiw.existing.quantities import require_one, unit_said
 from isiw.lazy import pd, scipy
@@ -26,11 +26,8 @@ from isiw.text.sanitize import counted
 
 TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
 WORKBOOKS: Final = (".xlsx", ".xlsm")
-STATISTICS: Final = {".sav": "read_sav", ".zsav": "read_sav", ".por": "read_por", ".dta": "read_dta"}
-"""Files of SPSS and Stata, and which function of pyreadstat reads them."""
-
-_LINES: Final = 100  # within so many lines the columns' names are sought
-_HEAD: Final = 40  # so many bytes show how a text is encoded
+STATISTICS: Final = {".sav": "read_sav", ".zsav": "read_sav", ".por": "read_por", ".dta": "read_dta"}  # of pyreadstat
+_LINES, _HEAD = 100, 40  # within so many lines the columns' names are sought; so many bytes show how a text is encoded
 _BLANKS: Final = r"\s+"
 _COUNT: Final = "If these trials count, show them as the others; if not, mark them in a column called exclude."
 _SHOWN_OTHERWISE: Final = (
@@ -39,8 +36,8 @@ _SHOWN_OTHERWISE: Final = (
      "Open the workbook in Excel or LibreOffice, and save it."),
     (rf'(?is)<comment ref="[A-Z]+(\d+)"(?:(?!</comment>).)*?<t[^>]*>\s*(?:{"|".join(WORDS["left out"])})[\s!.]*</t>',
      "left out by a note", _COUNT),
-)  # fmt: skip
-"""In a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do."""
+    (r'<mergeCell ref="[A-Z]+(\d+):[A-Z]+(?!\1")\d+"', "merged with others", "Write into each row what holds for it."),
+)  # fmt: skip # in a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do
 
 
 def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
@@ -79,9 +76,13 @@ def _labelled(path: Path, reader: str) -> pd.DataFrame:
 def named(frame: pd.DataFrame | None) -> pd.DataFrame:
     """A data frame whose index, if it has a name, is a column as others are, and whose columns have one name each."""
     frame = pd.DataFrame() if frame is None else frame
-    if any(name is not None for name in frame.index.names):
+    out_of_order = frame.index.is_unique and not frame.index.is_monotonic_increasing
+    if out_of_order or any(name is not None for name in frame.index.names):
         frame = frame.reset_index()
     names = [" ".join(map(str, name)) if isinstance(name, tuple) else str(name) for name in frame.columns]
+    if any(names[1:]) and letters(names[0]) in {"", "unnamed0"}:  # as R and pandas write the numbers of rows
+        numbers = pd.to_numeric(frame.iloc[:, 0], errors="coerce")
+        names[0] = "index" if numbers.notna().all() and numbers.is_unique else names[0]
     return frame.set_axis(names, axis=1)
 
 
@@ -96,7 +97,10 @@ def _texts(text: str, layout: Layout) -> pd.DataFrame:
     if lines and lines[0].startswith("#"):
         lines = [*_first_part(lines, separator)]
     lines = [line for line in lines if not line.startswith("# ")]
-    table = _table([row for row in _split(lines, separator) if row], layout, title)
+    every_row = [*_split(lines, separator)]
+    table = _table([row for row in every_row if row], layout, title)
+    below = len(every_row) - next((n for n in range(len(every_row), 1, -1) if not every_row[n - 1]), 0)
+    table.attrs["apart"] = len(table) - below if below < len(table) else None
     table.attrs["head"] = "".join(every[: layout.skip_lines + first])
     return table
 
@@ -122,8 +126,7 @@ def _first(lines: Sequence[str], layout: Layout) -> int:
         separator = layout.separator or _separator(line.lstrip("# "))
         names, *below = _split([line.lstrip("# "), *lines[number + 1 : number + 3]], separator)
         if _is_header(names, layout):
-            whole = all(len(row) >= len(names) for row in below if row)
-            found.append((not whole, separator == _BLANKS, number))
+            found.append((not all(len(row) >= len(names) for row in below if row), separator == _BLANKS, number))
     best = min(found, default=(True, True, 0))[-1]
     return next((number for number, line in enumerate(lines) if line == lines[best]), 0)  # where the names come first
 
@@ -157,10 +160,12 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     for number, row in enumerate(body, 1):
         if not all(is_missing(cell) for cell in row[len(names) :]):
             what = f"row {number} has {len(row)} cells, but there are {len(names)} names: no table that can be read"
-            remedy = "Is a decimal comma also what separates the cells? Save the file with another separator."
+            remedy = (
+                "Is a decimal comma also what separates the cells? Save the file with another separator. If it has "
+            )
+            remedy += "samples, describe it in a layout, as docs/your-data.md does (--layout)."
             raise InvalidValueError(what, got=" | ".join(map(str, row[: len(names) + 2])), remedy=remedy)
-    cells = [[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body]
-    table = pd.DataFrame(cells, columns=names)
+    table = pd.DataFrame([[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body], columns=names)
     table.attrs["title"] = title
     return table
 
@@ -183,7 +188,6 @@ def decoded(content: bytes) -> str:
 
 
 def _separator(line: str) -> str:
-    """The separator of the columns' names; blanks, if there is no other."""
     counts = {sign: line.count(sign) for sign in ("\t", ";", ",", "|")}
     best = max(counts, key=lambda sign: counts[sign])
     return best if counts[best] else _BLANKS
@@ -244,7 +248,7 @@ def _require_whole(book: Any, sheet: str, head: int) -> None:
     crossed = rf'<c r="[A-Z]+(\d+)" s="(?:{"|".join(styles)})"[^>/]*>' if styles else "(?!)"
     for pattern, are, remedy in (*_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT)):
         found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
-        if rows := [str(row) for row in found if row > head]:
+        if rows := [str(row) for row in sorted(found) if row > head]:
             what = f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}"
             got = f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}"
             raise InvalidValueError(what, got=got, remedy=remedy)
@@ -263,6 +267,9 @@ def read_arrays(path: Path) -> dict[str, Any]:
         values = library("pymatreader", "import").read_mat(str(path))
     else:
         values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
+    if {"data", "datastart", "dataend", "titles"} <= values.keys():
+        remedy = "In LabChart: File, Export, LabChart text (.txt), and a layout: docs/your-data.md."
+        raise InvalidValueError("this has LabChart's channels one behind the other", got="data", remedy=remedy)
     paths = dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
     last = Counter(path[-1] for path in paths)
     return {path[-1] if last[path[-1]] == 1 else ".".join(path): array for path, array in paths.items()}
@@ -291,5 +298,10 @@ def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
         what = "the file has no vectors that could be the columns of a table"
         remedy = "Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
         raise InvalidValueError(what, got=", ".join(arrays) or "nothing that can be read", remedy=remedy)
+    for name, vector in vectors.items():
+        if len(vector) != longest and vector.dtype.kind in "iuf" and np.any(vector > 1) and key_of_flags(name):
+            what = f"the vector {name!r} is not as long as that of the ISIs, as if it had the numbers of some trials"
+            remedy = "Save one in its place that has for each trial 1 if it does not count, and 0 if it does: exclude."
+            raise InvalidValueError(what, got=vector.tolist()[:5], remedy=remedy)
     units = {name: text for name, text in texts.items() if letters(name).endswith(("unit", "units"))}
     return pd.DataFrame({**{name: vector for name, vector in vectors.items() if len(vector) == longest}, **units})

@@ -18,13 +18,13 @@ from isiw.types import Reference
 
 ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µs": 1e-3, "μs": 1e-3}
 EMG_UNITS: Final[Mapping[str, float]] = {**EMG_UNITS_MV, "nV": 1e-6}  # in mV
-_FOUND: Final = read_toml(Path(__file__).with_name("words.toml"))
-UNIT_WORDS: Final[Mapping[str, str]] = {word: unit for unit, words in _FOUND["units"].items() for word in words}
-"""Units as files write them, in lower case."""
-COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {key: tuple(names) for key, names in _FOUND["columns"].items()}
-"""By what they are called in letters alone, the columns that are found without being named; the first name wins."""
+_FOUND: Final = {kind: {key: tuple(" ".join(word.split()) for word in text.split(",")) for key, text in texts.items()}
+                 for kind, texts in read_toml(Path(__file__).with_name("words.toml")).items()}  # fmt: skip
+UNIT_WORDS: Final[Mapping[str, str]] = {
+    word: unit for unit, words in _FOUND["units"].items() for word in words
+}  # lower case
+COLUMNS: Final[Mapping[str, tuple[str, ...]]] = _FOUND["columns"]
 WORDS: Final[Mapping[str, frozenset[str]]] = {kind: frozenset(words) for kind, words in _FOUND["words"].items()}
-"""Words of cells, and of columns' names in letters alone, by what they say."""
 MARKS: Final[Mapping[str, tuple[str, str]]] = {
     "pulse": ("the pulse of TMS", "tms pulse tmspulse magneticpulse"),
     "tap": ("the tap (its impact) or the electrical pulse", "tap impact hit electricalpulse conditioning pns"),
@@ -141,16 +141,6 @@ class Layout(Checked):
             kept = (unit for unit in self.units if not any(unit in known for known in said))
             given["units"] = (*given["units"], *kept)
         return replace(self, **given)
-
-
-def required_unit(layout: Layout, known: Mapping[str, float], said: str | None, what: str, got: str | None) -> str:
-    """The unit of something: the one that is stated, or else the one that the file says."""
-    unit = layout.unit_of(known) or said
-    if unit is None or unit not in known:
-        units = "ms or s" if known is ISI_UNITS_MS else "mV, uV or V"
-        what = f"the unit of {what} is not stated, or unknown"
-        raise InvalidValueError(what, got=got, remedy=f"Say --unit with {units}.")
-    return unit
 
 
 def read_layout(path: str | Path) -> Layout:

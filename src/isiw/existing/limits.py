@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import glob
-import math
 import os
 import re
 import time
@@ -11,7 +10,7 @@ import zipfile
 from dataclasses import dataclass, fields, replace
 from itertools import islice
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Final, Literal
 
 from isiw.checks import Checked, Count, Positive, number
 from isiw.errors import InvalidValueError
@@ -28,8 +27,7 @@ _ROWS_PER_S: Final = 2e3  # a second more for each so many rows, once they are r
 _SIGNS: Final = (b"\t", b";", b",", b"|")  # what separates the cells of a text
 _BLANKS: Final = re.compile(rb"\s\S")  # or else blanks do
 _BYTES_PER_SIGN: Final = 4  # a character takes no more
-_FIRST_LINES: Final = 100
-_CHUNK: Final = 2**20
+_FIRST_LINES, _CHUNK = 100, 2**20
 LARGEST_FACTOR: Final = 1e6  # by which limits are multiplied at most, so that each remains a number
 
 
@@ -149,18 +147,9 @@ def require_most(source: str, *counts: tuple[str, float, float, str]) -> None:
             raise passed(source, what, f"{got:.0f}{unit}" if unit else got, most, unit)
 
 
-def limit_memory(memory_mb: float) -> None:
-    """Limit the memory that this process may take [MB], where the system can: Linux counts all of it, Windows none."""
-    _limit("DATA", 1e6 * memory_mb)
-
-
-def limit_time(seconds: float) -> None:
-    """Limit the processor time that this process may take from now on [s], where the system can."""
-    _limit("CPU", math.ceil(time.process_time() + seconds))
-
-
-def _limit(what: str, most: float) -> None:
+def limit(kind: Literal["DATA", "CPU"], most: float) -> None:
+    """Limit the memory of this process [bytes] on Linux, or its processor time from now on [s], but on Windows."""
     if resource is not None:
-        kind = getattr(resource, f"RLIMIT_{what}")
-        _, hard = resource.getrlimit(kind)
-        resource.setrlimit(kind, (int(most if hard < 0 else min(most, hard)), hard))
+        limited, begun = getattr(resource, f"RLIMIT_{kind}"), 1 + time.process_time() if kind == "CPU" else 0
+        _, hard = resource.getrlimit(limited)
+        resource.setrlimit(limited, (int(most + begun if hard < 0 else min(most + begun, hard)), hard))

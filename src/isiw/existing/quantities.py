@@ -10,23 +10,13 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing import doubts
-from isiw.existing.cells import Column, says_alone, with_decimals, without_unit_in_cells
-from isiw.existing.layout import (
-    COLUMNS,
-    EMG_UNITS,
-    ISI_UNITS_MS,
-    UNIT_WORDS,
-    WORDS,
-    Layout,
-    letters,
-    plain,
-    required_unit,
-    unit_named,
-)
+from isiw.existing.cells import Column, required_unit, says_alone, with_decimals, without_unit_in_cells
+from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, WORDS, Layout, letters, plain, unit_named
 from isiw.findings import Kind
 from isiw.lazy import pd
 
 _ASKED: Final = frozenset({"isi", "mep", "status", "exclude"})  # of which there may be two, that say different things
+_OF_ISIS: Final = "Correct it; if it is TMS alone, say --alone with it; or name another column: --column isi=NAME."
 
 
 @dataclass(frozen=True)
@@ -79,13 +69,7 @@ class Columns:
         """The columns of a table, as they are named or else as they are called."""
         names = [str(name) for name in frame.columns]
         held = {key: _named(key, names, layout, source) for key in COLUMNS if key != "mep" or key in needed}
-        for key, held_ones in (("isi", "ISIs"), ("mep", "amplitudes of the MEPs")):
-            if key in needed and held[key] is None:
-                what = f"no column of {source} is known to hold the {held_ones}"
-                got = ", ".join(name for name in names if name.strip()) or "no names"
-                remedy = f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file '
-                remedy += "(--layout)."
-                raise InvalidValueError(what, got=got, remedy=remedy)
+        _require_held([key for key in needed if held[key] is None], frame, source)
         columns, of_units = dict[str, Column](), set[str]()
         for key, name in held.items():
             if name is not None:
@@ -94,6 +78,7 @@ class Columns:
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
                 of_units |= units.keys()
         columns, stated = _scaled(columns, layout)
+        columns["isi"] = replace(columns["isi"], remedy=_OF_ISIS)
         for key in [key for key in columns if key not in layout.columns and _is_another(key, columns)]:
             held[key] = None
             del columns[key]
@@ -101,12 +86,11 @@ class Columns:
             columns["subject"] = replace(columns["subject"], of_codes=True)
         if "mep" in columns:
             doubts.require_single_trials(columns["mep"], columns["isi"], frame, source)
-        beside = {
-            name: Column(name, frame.iloc[:, place].tolist(), of=source)
-            for place, name in enumerate(names)
-            if name not in {*held.values(), *of_units} and name.strip()
-        }
-        doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})])
+        used = {*held.values(), *of_units}
+        beside = {name: Column(name, frame.iloc[:, place].tolist(), of=source)
+                  for place, name in enumerate(names) if name not in used and name.strip()}  # fmt: skip
+        doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})],
+                                   layout.where)  # fmt: skip
         doubts.require_reference(columns["isi"], layout.reference)
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = WORDS["alone"] | WORDS["tap alone"]
@@ -117,16 +101,26 @@ class Columns:
         return cls(columns, _chosen([*columns.values(), *beside.values()], layout), layout, stated, beside, empty)
 
 
+def _require_held(missing: Sequence[str], frame: pd.DataFrame, source: str) -> None:
+    for key in missing:
+        what = f"no column of {source} is known to hold the {'ISIs' if key == 'isi' else 'amplitudes of the MEPs'}"
+        got = ", ".join(str(name) for name in frame.columns if str(name).strip()) or "no names"
+        remedy = f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file (--layout); '
+        remedy += "if each ISI has a column, or each trial, write a row for each trial."
+        if len(frame) > 5000:  # so many trials has nobody
+            remedy = "If these are samples, a row each, say --channel emg=NAME, and write rate_hz into a layout."
+        raise InvalidValueError(what, got=got, remedy=remedy)
+
+
 def _is_another(key: str, columns: Mapping[str, Column]) -> bool:
     """True if a column is of no use as what its name says: an id of each row, reasons of nothing, or amplitudes."""
-    texts = columns[key].texts if key in {"subject", "tms_alone"} else []
+    texts = columns[key].texts if key in {"subject", "tms_alone", "order"} else []
     if key == "subject":
         return letters(columns[key].name) == "id" and 1 < len(texts) == len({*texts})
     if key == "tms_alone":
         return not {*map(str.casefold, texts)} <= {"", *WORDS["yes"], *WORDS["no"]}
-    if key == "order":  # such as before and after
-        return not any(re.search(r"\d", text) for text in columns[key].texts)
-    return key == "reason" and not {"status", "exclude"} & columns.keys()
+    said = re.search(r"\d", "".join(texts)) if key == "order" else {"status", "exclude"} & columns.keys()
+    return key in {"order", "reason"} and not said  # such as before and after
 
 
 def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:
@@ -182,7 +176,8 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
                if known == first or (key in _ASKED and len({known, first} & WORDS["vague"]) != 1)]  # fmt: skip
     if len(several) > 1:
         what = f"several columns of {source} may hold the {key}"
-        remedy = f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them."
+        alike = "Rename one of them; if they are further trials, write a row for each."
+        remedy = f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else alike
         raise InvalidValueError(what, got=" or ".join(several), remedy=remedy)
     return several[0] if several else None
 
@@ -225,9 +220,8 @@ def _required_unit(key: str, what: str, column: Column, layout: Layout, known: M
     """The column's unit, as it is stated or as its name says, which must not say that it is something else."""
     doubts.require_of_kind(key, what, column.name, column.of)
     if (other := unit_said(column.name, dict.fromkeys({*UNIT_WORDS.values()} - known.keys(), 1.0))) is not None:
-        what = f"the column {column.name!r} of {column.of} says a unit of no {what}"
         remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."
-        raise InvalidValueError(what, got=other, remedy=remedy)
+        raise column.doubted(f"says a unit of no {what}", other, remedy)
     some = ", ".join(filter(None, column.texts[:5])) or None
     what = f"the {what} of {column.of} in the column {column.name!r}"
     return required_unit(layout, known, unit_said(column.name, known), what, some)

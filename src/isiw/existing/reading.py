@@ -17,7 +17,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing import doubts, formats, frames, recordings
 from isiw.existing.apart import read_apart
 from isiw.existing.cells import dates_of, is_missing, latest_of
-from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
+from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered, spelt_otherwise
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import CHANNELS, EMG_UNITS, Layout
@@ -63,7 +63,16 @@ def read_people(
         ConfigError: a library is not installed.
         LogError: a log that cannot be read.
     """
-    layout = layout or Layout()
+    people = people_in(source, layout or Layout(), subject, limits or ReadingLimits(), also)
+    for error in spelt_otherwise(one.subject for one in people).values():
+        raise error
+    return people
+
+
+def people_in(
+    source: str | Path | Any, layout: Layout, subject: str, limits: ReadingLimits, also: Sequence[str | Path]
+) -> list[Delivered]:
+    """The same, also of codes that may be two spellings of one."""
     if not isinstance(source, str | Path):
         return people_of_contents(_in_memory(source), None, layout, subject)
     path = Path(source)
@@ -74,7 +83,7 @@ def read_people(
         return [found]
     if not path.exists():
         raise InvalidValueError("there is no such file", got=str(path), remedy="Check the path.")
-    return read_apart(path, layout, subject, limits or ReadingLimits(), also).people
+    return read_apart(path, layout, subject, limits, also).people
 
 
 def contents_in(path: Path, layout: Layout, limits: ReadingLimits) -> Contents:
@@ -90,12 +99,13 @@ def people_of_contents(
     contents: Contents, path: Path | None, layout: Layout, subject: str, limits: ReadingLimits | None = None
 ) -> list[Delivered]:
     """The people whose trials are in what a file holds; who has no code is called as the file is."""
+    if contents.trials is None and not contents.tracks:
+        remedy = "Record or export it again so that the stream of EMG, or its channel, says its rate, or as EDF+."
+        raise InvalidValueError(f"{contents.source} has no channel of samples at a rate", remedy=remedy)
     _require_used(contents, path, layout)
     name = subject or ("" if path is None else path.stem)
-    if contents.tracks:
-        people = [recordings.of_contents(contents, layout, name)]
-    else:
-        people = _people_of(frames.named(contents.trials), layout, contents.source, name, limits)
+    people = ([recordings.of_contents(contents, layout, name)] if contents.tracks
+              else _people_of(frames.named(contents.trials), layout, contents.source, name, limits))  # fmt: skip
     for one in people:
         doubts.require_short(one, layout)
     return people
@@ -131,25 +141,23 @@ def _require_use(layout: Layout, used: Mapping[str, AbstractSet[str] | None], so
 
 
 def _in_memory(source: Any) -> Contents:
-    """What a table holds, or a recording that MNE has read."""
     if isinstance(source, pd.DataFrame):
         return Contents("the table", trials=source)
     if hasattr(source, "metadata") and hasattr(source, "get_data"):
         return mne_files.of_epochs(source)
     if hasattr(source, "annotations"):
         return mne_files.of_raw(source)
-    expected = "a path, a DataFrame, or mne.Epochs or Raw"
-    raise InvalidValueError("this holds no trials", got=source, expected=expected)
+    raise InvalidValueError("this holds no trials", got=source, expected="a path, a DataFrame, or mne.Epochs or Raw")
 
 
 def _people_of(
     frame: pd.DataFrame, layout: Layout, source: str, name: str, limits: ReadingLimits | None
 ) -> list[Delivered]:
-    """The people of a table, in the order in which they come first."""
     reference = layout.required_reference(source)
     columns = Columns.found(frame, layout, source)
     given = [columns[key].cells for key in ("isi", "mep", "asked")]
-    columns = replace(columns, rows=[n for n in columns.rows if not all(is_missing(cells[n]) for cells in given)])
+    empty = {n for n in columns.rows if all(is_missing(cells[n]) for cells in given)}
+    columns = replace(columns, rows=[n for n in columns.rows if n not in empty])
     if not columns.rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
     doubts.require_codes(columns)
@@ -166,11 +174,12 @@ def _people_of(
         begun = dates[own[0]].isoformat(timespec="microseconds") if own[0] in dates else ""
         given_by = latest_of([columns["date"].text(row) for row in own], [dates.get(row) for row in own])
         found.append(replace(person, visit=replace(person.visit, day=day), created=begun, given_by=given_by))
+    apart = max((row for row in columns.rows if row - 1 in empty), default=frame.attrs.get("apart"))
+    doubts.require_no_summaries(columns, apart)
     return found
 
 
 def _by_text(texts: Iterable[str], rows: Iterable[int]) -> dict[str, list[int]]:
-    """Rows by the texts that they have."""
     found: dict[str, list[int]] = {}
     for text, row in zip(texts, rows, strict=True):
         found.setdefault(text, []).append(row)
@@ -240,20 +249,19 @@ def _trial(columns: Columns, row: int, number: int, space: DesignSpace, signals:
 
 def _with_intensities(trials: Sequence[Trial], columns: Columns) -> tuple[list[Trial], float | None]:
     """Trials of TMS alone with their intensities [% RMT], and that of all pairs; None where none is stated."""
+    name, own, paired = columns["intensity"].name, list[Trial](), dict[float | None, str]()
     stated = [columns["intensity"].number(row) for row in columns.rows]
-    for row, pct_rmt in zip(columns.rows, stated, strict=True):
+    for row, pct_rmt, trial in zip(columns.rows, stated, trials, strict=True):
         if pct_rmt is not None and not INTENSITY_PCT.least <= pct_rmt <= _STRONGEST_PCT_RMT:
             remedy = "It must be in % of the resting motor threshold."
             raise columns.of["intensity"].refused(row, "is no intensity in % RMT", remedy)
-    paired = {pct_rmt for trial, pct_rmt in zip(trials, stated, strict=True) if trial.wanted_isi_ms is not None}
-    rows = zip(columns.rows, trials, stated, strict=True)
-    name, texts = columns["intensity"].name, {pct_rmt: columns["intensity"].text(row) for row, trial, pct_rmt in rows
-                                              if trial.wanted_isi_ms is not None and pct_rmt}  # fmt: skip
-    if len(texts) > 1 and name not in columns.layout.where:
-        what, got = f"the pairs of {columns['isi'].of} have several intensities", ", ".join(texts.values())
-        remedy = f'Say --where "{name}={next(iter(texts.values()))}" for one of them, or --where "{name}={doubts.ALL}" '
+        if trial.wanted_isi_ms is not None:
+            paired[pct_rmt] = columns["intensity"].text(row)
+    if len(texts := [text for text in paired.values() if text]) > 1 and name not in columns.layout.where:
+        what, got = f"the pairs of {columns['isi'].of} have several intensities", ", ".join(texts)
+        remedy = f'Say --where "{name}={texts[0]}" for one of them, or --where "{name}={doubts.ALL}" '
         raise InvalidValueError(what, got=f"{got} % RMT", remedy=f"{remedy}if all are to be analysed together.")
-    usual, own = paired.pop() if len(paired) == 1 else None, list[Trial]()
+    usual = next(iter(paired)) if len(paired) == 1 else None
     for trial, pct_rmt in zip(trials, stated, strict=True):
         of_alone = trial.wanted_isi_ms is None and not trial.tap_alone and pct_rmt != usual
         own.append(replace(trial, intensity_pct_rmt=pct_rmt) if of_alone else trial)

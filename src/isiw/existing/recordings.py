@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from itertools import pairwise
@@ -11,25 +11,27 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import is_missing
+from isiw.existing.cells import is_missing, required_unit
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_said
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
-from isiw.existing.layout import EMG_UNITS, MARKERS, Layout, required_unit, unit_named
+from isiw.existing.layout import EMG_UNITS, MARKERS, Layout, unit_named
 from isiw.existing.markers import Pulse, marked, names_of, pulses_of
 from isiw.existing.quantities import Columns, isis_of, require_one, unit_said
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
 from isiw.signals.limits import SignalLimits
+from isiw.signals.watch import shown_by
 from isiw.sweeps import Channel, Sweep
 from isiw.trials import Status, Stimulus, Trial
 from isiw.types import FloatArray
 
 _BEFORE_S, _AFTER_S = 0.15, 0.1  # of a continuous recording, before the longest ISI and after the pulse
 _APART_MS: Final = 2.0  # an ISI in a table that differs by more from that of the events is another one
+_CLEAR, _EDGE, _FEW = 25.0, 0.4, 3  # an MEP so many times the EMG at rest is cut off if it has so much at an edge
 _IF_NONE_COUNTS: Final = (
     "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest without mains "
     "hum, at most {:g} µV RMS? See docs/timing.md."
@@ -38,8 +40,7 @@ OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
     "columns": {"isi", "status", "exclude", "reason", "tap_alone", "tms_alone", "subject", "day", "condition"},
     "channels": {"emg", "tap", "valve"},
     "markers": {"pulse", "tap", "valve"},
-}
-"""What columns, channels and markers can hold that is used of sweeps whose ISIs are stated."""
+}  # what columns, channels and markers can hold that is used of sweeps whose ISIs are stated
 
 
 def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
@@ -55,12 +56,12 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         what = f"two pulses of {source} are less than {1e3 * _AFTER_S:g} ms apart"
         raise InvalidValueError(what, remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.")
     limits = SignalLimits() if layout.mep_window_ms is None else SignalLimits(mep_window_ms=layout.mep_window_ms)
-    longest_s, trials, sweeps = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0), list[Trial](), {}
+    longest_s, trials = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0), list[Trial]()
+    seen, sweeps = list[tuple[Sweep, Trial]](), dict[int, Mapping[str, Channel]]()
     bad = contents.events[contents.events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         sweep = _cut(signals, pulse, pulse.at_s - _BEFORE_S - longest_s, key)
-        if sweep.channels:
-            sweeps[number] = sweep.channels
+        sweeps |= {number: sweep.channels} if sweep.channels else {}
         for isi_ms in isis_of(pulse.said) if pulse.isi_s is not None else ():
             _require_same(f"the trial at {pulse.at_s:.3f} s of {source}", isi_ms, pulse.isi_s)
         if pulse.lost:
@@ -68,16 +69,17 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
             continue
         asked_ms: Any = pulse.said.get("commanded_isi_ms")  # what the file says, or else what the events do
         asked_ms = max(1e3 * (pulse.isi_s or 0.0), 0.0) if is_missing(asked_ms) else float(asked_ms)
-        stimulus = Stimulus(number, None if pulse.isi_s is None else asked_ms)
-        judged = judge(sweep, stimulus, anywhere(reference), limits)
+        judged = judge(sweep, Stimulus(number, None if pulse.isi_s is None else asked_ms), anywhere(reference), limits)
         begin_s, end_s = min(pulse.at_s - _BEFORE_S, pulse.origin_s or pulse.at_s), pulse.at_s + _AFTER_S
         is_bad = bool(((bad["onset"] <= end_s) & (bad["onset"] + bad["duration"] >= begin_s)).any())
         trials.append(replace(judged, excluded=is_bad or pulse.said.get("excluded") in {True, "true", "True"}))
-    if trials and not any(trial.told for trial in trials):
-        reasons = sorted({str(trial.reason) for trial in trials if trial.reason})
-        what = f"no sweep of {source} counts"
+        seen += [(sweep, judged)] if trials[-1].told else []
+    if trials and not seen:
+        got = ", ".join(sorted({str(trial.reason) for trial in trials if trial.reason})) or "excluded ones"
         remedy = " ".join([*contents.notes, _IF_NONE_COUNTS.format(limits.background_uv)])
-        raise InvalidValueError(what, got=", ".join(reasons) or "excluded ones", remedy=remedy)
+        raise InvalidValueError(f"no sweep of {source} counts", got=got, remedy=remedy)
+    if layout.mep_window_ms is None and any(trial.isi_ms is not None for trial in trials):
+        _require_within(seen, limits, source)
     emg = [channels["emg"].values for channels in sweeps.values() if "emg" in channels]
     return Delivered(
         renumbered(trials),
@@ -92,6 +94,29 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     )
 
 
+def _require_within(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, source: str) -> None:
+    """Raise if most responses are not where MEPs are measured, or go on beyond an edge of it, or if there are none."""
+    (first_ms, last_ms), responses_ms, usual = limits.mep_window_ms, list[float | None](), False
+    for sweep, trial in seen:
+        shown, emg = shown_by(sweep, trial, limits), sweep.channels["emg"]
+        since_ms = np.arange(len(emg.values)) * (1e3 / emg.rate_hz) + emg.t0_ms - (sweep.t_tms_ms or 0.0)
+        within = np.abs(emg.values - np.median(emg.values))[(since_ms >= first_ms) & (since_ms <= last_ms)]
+        if shown.outside is not None:
+            responses_ms.append(shown.outside.at_ms)
+        elif shown.mep_mv > _CLEAR * (shown.rest_uv or np.inf) / 1e3:
+            edges = zip((first_ms, last_ms, None), (*(within[[0, -1]] > _EDGE * within.max()), True), strict=True)
+            responses_ms.append(next(at_ms for at_ms, is_large in edges if is_large))
+        usual |= shown.stands_out
+    odd_ms = [at_ms for at_ms in responses_ms if at_ms is not None]
+    if len(seen) > _FEW and (not usual or (2 * len(odd_ms) > len(responses_ms) and 4 * len(odd_ms) > len(seen))):
+        what = f"most responses in {source} are not within {first_ms:g}–{last_ms:g} ms after the pulse, where MEPs are "
+        got = f"{len(odd_ms)} of {len(seen)}, about {np.median(odd_ms):.0f} ms after it" if odd_ms else "none at all"
+        remedy = (
+            "Does its marker, or time 0, come at the pulse? If so, write the muscle's mep_window_ms = [FIRST, LAST] "
+        )
+        raise InvalidValueError(f"{what}measured", got=got, remedy=f"{remedy}into a layout.")
+
+
 def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[str, Track], str]:
     """Contents with the events of triggers, the channels that are no triggers, the EMG in mV, and what unit it had."""
     held = {"emg": None, **dict.fromkeys(key for key in layout.channels if key != "events")}
@@ -102,8 +127,7 @@ def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[st
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
     emg = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
     known, notes = unit_named(emg.unit), contents.notes
-    what = f"the channel {emg.name!r} of {contents.source}"
-    unit = required_unit(layout, EMG_UNITS, known, what, emg.unit or None)
+    unit = required_unit(layout, EMG_UNITS, known, f"the channel {emg.name!r} of {contents.source}", emg.unit or None)
     if known not in {None, unit}:
         notes = (*notes, f"{contents.source} says {emg.unit}, and {unit} is used, as stated.")
     signals = {key: track for key, track in tracks.items() if key not in MARKERS}
@@ -146,8 +170,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
         at_s = sweep.start_s + (contents.pulse_at_s or 0.0) + ((isi_s or 0.0) if at_tap else 0.0)
         span_s = sweep.start_s, sweep.start_s + sweep.samples / emg.rate_hz
         lost = layout.unmarked == "lost" and not columns["isi"].text(row)
-        said = {"excluded": columns.lost(row) is not None}
-        pulses.append(Pulse(at_s, isi_s, lost=lost, sweep_s=span_s, said=said))
+        pulses.append(Pulse(at_s, isi_s, lost=lost, sweep_s=span_s, said={"excluded": columns.lost(row) is not None}))
     return pulses, tuple(columns.beside), _only_one(columns)
 
 

@@ -26,15 +26,13 @@ from isiw.types import FloatArray
 from isiw.window import Window
 
 NEAR_MS: Final = 2.5  # half of the dissertation's step between ISIs; what is farther away answers another one
-_MARKS: Final = (5, 10, 15, 20, 30, 40, 60, 80, 100)
-"""Numbers of stimuli at which the agreement is said."""
+_MARKS: Final = (5, 10, 15, 20, 30, 40, 60, 80, 100)  # stimuli, after which the agreement is said
 
 SHARED: Final = (
     "The trials that answer are among those of the answer from all trials, so that the two agree more than two "
     "sessions of this person would. Each amplitude is as it was recorded at its place in the session: drift and a "
     "startle at the start come at other places than they would have."
-)
-"""What is said beside every replay."""
+)  # is said beside every replay
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +65,7 @@ class Replay:
     @cached_property
     def window(self) -> Window | None:
         """The window that the default reports after all trials."""
-        strategy = make_strategy("default", self.space, self.runs[0].seed)
-        return analysed(self.delivered, strategy).estimate.window
+        return analysed(self.delivered, make_strategy("default", self.space, self.runs[0].seed)).estimate.window
 
     @property
     def strategies(self) -> list[str]:
@@ -97,10 +94,8 @@ class Replay:
         """How many of a strategy's ISIs no trial answered; empty if one answered each."""
         far_ms = np.concatenate([run.far_ms for run in self.runs if run.strategy == name])
         share = float((far_ms > NEAR_MS).mean())
-        said = (
-            f"{name}: {100 * share:.0f} % of its ISIs could not be answered: no trial was left within {NEAR_MS:g} ms, "
-        )
-        return f"{said}and the nearest one answered, at most {far_ms.max():.0f} ms away." if share else ""
+        said = f"{name}: {100 * share:.0f} % of its ISIs could not be answered: no trial was left within {NEAR_MS:g} ms"
+        return f"{said}, and the nearest one answered, at most {far_ms.max():.0f} ms away." if share else ""
 
     def _lines(self, name: str) -> Iterator[str]:
         scores = self.f1_by_trial(name)
@@ -175,8 +170,7 @@ def _run(
     for _ in range(trials):
         asked_ms = strategy.ask()
         gaps_ms = np.abs([(trial.wanted_isi_ms or 0.0) - asked_ms for trial in left])
-        nearest = np.flatnonzero(gaps_ms <= gaps_ms.min() + 1e-9)
-        trial = left.pop(int(rng.choice(nearest)))
+        trial = left.pop(int(rng.choice(np.flatnonzero(gaps_ms <= gaps_ms.min() + 1e-9))))
         far_ms.append(float(gaps_ms.min()))
         strategy.learn(trial)
         windows.append(strategy.estimate().window)

@@ -36,13 +36,9 @@ _MNE: Final = "Are all of its files in one folder? Otherwise export it as EDF+ o
 _XDF: Final = "Record again with LabRecorder, or save the streams as EDF+."
 _ASKED: Final = "A layout says what is what: docs/your-data.md."
 _CFS: Final = "In Signal: File, Export As, Text file (.txt), the frames one below the other, or MATLAB data (.mat)."
-_SMRX: Final = (
-    "In Spike2: File, Export As, Spreadsheet text (.txt), a row a sample, EMG and triggers as columns; or "
-    f"File, Export As, an older Spike2 file (.smr). {_ASKED}"
-)
-_ADICHT: Final = (
-    "In LabChart: File, Export, LabChart text (.txt), with block header, time and comments; or MATLAB (.mat)."
-)
+_SMRX: Final = ("In Spike2: File, Export As, Spreadsheet text (.txt), a row a sample, EMG and triggers as columns; or "
+                f"File, Export As, an older Spike2 file (.smr). {_ASKED}")  # fmt: skip
+_ADICHT: Final = "In LabChart: File, Export, LabChart text (.txt), with block header, time and comments."
 _GPL: Final = "Install BioSig for Python, whose licence is GPL-3"
 _ACQ: Final = "In AcqKnowledge: File, Save As, text (.txt) or MATLAB (.mat), and a layout."
 

@@ -20,8 +20,7 @@ from isiw.lazy import pd
 from isiw.types import FloatArray
 
 _PERIOD: Final = re.compile(r"(?i)(?=interval\W|[\d.]+\s*\w+/sample)(?:interval\W+)?(\d[\d.e-]*)\s*([a-zµ]+)")
-_RATE: Final = re.compile(r"(?:rate|sampl|frequency)[^\n\d]*(\d[\d.]*)\s*(k?)Hz", re.IGNORECASE)
-"""What the lines above samples say of the time between them, or of their rate."""
+_RATE: Final = re.compile(r"(?:rate|sampl|frequency)[^\n\d]*(\d[\d.]*)\s*(k?)Hz", re.IGNORECASE)  # above samples
 _FEW: Final = 0.01  # with a larger share of steps that are longer than usual, times have no pauses but are rounded
 _OF_LAYOUT: Final = "Correct rate_hz in the layout; what has another rate must be a file of its own."
 
@@ -76,8 +75,7 @@ def require_rate(stated_hz: float, found_hz: float, where: str, remedy: str = _O
 
 def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[int, float]] | None:
     """The rate that times of samples say, and how long pauses were before some [s]; None if they are no such times."""
-    times = pd.to_numeric(cells.astype(str).str.replace(",", "."), errors="coerce").to_numpy(dtype=np.float64)
-    steps = np.diff(times)
+    steps = np.diff(pd.to_numeric(cells.astype(str).str.replace(",", "."), errors="coerce").to_numpy(dtype=np.float64))
     usual = float(np.median(steps)) if len(steps) > 1 else 0.0
     late = np.flatnonzero((steps > 1.5 * usual) | (steps < 0))  # or they begin again, and nobody knows how much later
     if not 0 < len(late) < _FEW * len(steps):

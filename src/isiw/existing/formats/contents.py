@@ -8,7 +8,6 @@ from functools import partial
 from itertools import pairwise
 from operator import itemgetter
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -39,14 +38,14 @@ class Stretch(NamedTuple):
 
 
 def parted(
-    cuts: Iterable[int], samples: int, rate_hz: float, missing_s: Mapping[int, float] = MappingProxyType({})
+    cuts: Iterable[int], samples: int, rate_hz: float, missing_s: Mapping[int, float] | None = None
 ) -> tuple[Stretch, ...]:
     """Samples as stretches: before those at cuts something is missing, for `APART_S` if it is not known how long."""
     found, first, start_s = list[Stretch](), 0, 0.0
     for at in sorted({*cuts, samples}):
         if first < at <= samples:
             found.append(Stretch(first, at - first, start_s))
-            first, start_s = at, start_s + (at - first) / rate_hz + (missing_s.get(at) or APART_S)
+            first, start_s = at, start_s + (at - first) / rate_hz + ((missing_s or {}).get(at) or APART_S)
     return tuple(found)
 
 
@@ -143,9 +142,8 @@ class Track:
 
     def cut(self, inside_s: float, begin_s: float, end_s: float) -> tuple[float, FloatArray] | None:
         """What the stretch about a time has between two others: when that begins [s], and numbers; None in a gap."""
-        slack_s = 0.5 / self.rate_hz
         for first, samples, start_s in self.stretches:
-            if start_s - slack_s <= inside_s < start_s + samples / self.rate_hz + slack_s:
+            if -0.5 <= (inside_s - start_s) * self.rate_hz < samples + 0.5:
                 begin = round((begin_s - start_s) * self.rate_hz)
                 end = max(0, min(begin + round((end_s - begin_s) * self.rate_hz), samples))
                 begin = max(0, begin)
@@ -174,11 +172,9 @@ class Track:
             falls += (at_s + np.flatnonzero(turns < 0) / self.rate_hz).tolist()
         spans_s = np.diff(sorted([*rises, *falls]))
         if len(spans_s) > 2 and 0.5 < np.median(spans_s[0::2]) / np.median(spans_s[1::2]) < 2:
-            what = f"the trigger {self.name!r} is about as long at one level as at the other, so that it cannot be "
-            what += "known which of its edges are stimuli"
-            got = f"{len(rises)} edges up and {len(falls)} down"
+            what = f"the trigger {self.name!r} is as long at one level as at the other: which of its edges are stimuli?"
             remedy = "Export events in its place, or a trigger that is short for each stimulus."
-            raise InvalidValueError(what, got=got, remedy=remedy)
+            raise InvalidValueError(what, got=f"{len(rises)} edges up and {len(falls)} down", remedy=remedy)
         return falls if 2 * high > sum(stretch.samples for stretch in self.stretches) else rises
 
     def codes(self) -> list[tuple[float, int]]:
@@ -191,8 +187,7 @@ class Track:
             codes = np.rint(values).astype(np.int64)
             old = np.append(round(last), codes[:-1])
             up = np.flatnonzero(codes > old)
-            times_s = (at_s + up / self.rate_hz).tolist()
-            found += zip(times_s, codes[up].tolist(), old[up].tolist(), strict=True)
+            found += zip((at_s + up / self.rate_hz).tolist(), codes[up].tolist(), old[up].tolist(), strict=True)
         alone = {code for _, code, before in found if before == 0}
         added = {(code, before) for _, code, before in found if before & code == before and code ^ before in alone}
         added = {both for both in added if both[0] not in alone}
@@ -202,8 +197,7 @@ class Track:
 def text_of(*values: Any) -> str:
     """What an event is called, by its texts and codes; a whole number has no decimal sign."""
     texts = (value.decode("utf-8", "replace") if isinstance(value, bytes) else value for value in values)
-    numbers = (int, float, np.number)
-    return " ".join(f"{one:.15g}" if isinstance(one, numbers) else f"{one}" for one in texts).strip()
+    return " ".join(f"{one:.15g}" if isinstance(one, int | float | np.number) else f"{one}" for one in texts).strip()
 
 
 def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
@@ -246,10 +240,9 @@ class Contents:
             return replace(self, tracks=tracks)
         off = (events["onset"] * tracks[0].rate_hz - events.get("sample", np.nan)).abs().median() if tracks else 0.0
         if tracks and off > 0.1 * tracks[0].rate_hz:
-            what = f"the onsets of events beside {self.source} are not those of their samples"
-            got, expected = f"a difference of {off:.0f} samples", f"seconds, at {tracks[0].rate_hz:g} Hz"
+            what, expected = f"the onsets of events beside {self.source} are not those of their samples", "seconds"
             remedy = "Correct the onsets, or the samples, in the file of events."
-            raise InvalidValueError(what, got=got, expected=expected, remedy=remedy)
+            raise InvalidValueError(what, got=f"{off:.0f} samples apart", expected=expected, remedy=remedy)
         named = [events[one] for one in ("trial_type", "value") if one in events and events[one].notna().any()]
         names = [text_of(each) for each in named[0]] if named else ""
         return replace(self, tracks=tracks, events=events.assign(name=names))

@@ -116,5 +116,4 @@ def _header(path: Path) -> _Header:
 
 
 def _text(field: bytes) -> str:
-    """A text as headers and annotations have it."""
     return decoded(field.strip(b" \0"))

@@ -22,9 +22,15 @@ def read(path: Path, layout: Layout) -> Contents:
         return columns.read(path, layout)
     arrays = frames.read_arrays(path)
     quantities.require_one("array", source, name, arrays)
+    rate_hz = columns.required(layout, "rate_hz", f"the sampling rate of {source}")
+    numbers = {other: array.item() for other, array in arrays.items() if array.size == 1 and array.dtype.kind in "fiu"}
+    for other, number in numbers.items():
+        if number > 0 and (word := letters(other.split(".")[-1])) in WORDS["rates"]:
+            columns.require_rate(rate_hz, number, f"{other!r} of {source}")
+        elif number > 0 and word in WORDS["periods"]:
+            columns.require_period(rate_hz, number, None, f"{other!r} of {source}")
     if arrays[name].squeeze().ndim < 2:
         return columns.read(path, layout)
-    rate_hz = columns.required(layout, "rate_hz", f"the sampling rate of {source}")
     pulse_at_ms = columns.required(layout, "pulse_at_ms", f"the time of the pulse in a sweep of {source}")
     beside, sweeps = frames.of_vectors(arrays, layout), np.asarray(arrays[name], dtype=np.float64)
     if sweeps.ndim != 2 or (count := len(beside)) not in sweeps.shape:
@@ -32,11 +38,6 @@ def read(path: Path, layout: Layout) -> Contents:
         got = f"{' × '.join(map(str, sweeps.shape))} samples and {len(beside)} ISIs"
         raise InvalidValueError(what, got=got, remedy="Save a row or a column for each ISI.")
     for other, array in arrays.items():
-        number = float(array.item()) if array.size == 1 and array.dtype.kind in "fiu" else 0.0
-        if number and letters(other) in WORDS["rates"]:
-            columns.require_rate(rate_hz, number, f"{other!r} of {source}")
-        if number > 0 and letters(other) in WORDS["periods"]:
-            columns.require_period(rate_hz, number, None, f"{other!r} of {source}")
         if array.size == sweeps.size // count != count:
             _require_zero(other, array.ravel(), rate_hz, pulse_at_ms, source)
     said = "".join([name, *(f" ({unit})" for unit in quantities.units_beside("emg", name, beside).values())])

@@ -64,11 +64,9 @@ def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
     length, zero_s = len(epochs.times), -float(epochs.tmin)
     stretches = parted(range(0, length * len(epochs), length), length * len(epochs), float(epochs.info["sfreq"]))
     tracks = tuple(_tracks(epochs, stretches, lambda index, first, last: flat[index][first:last]))
-    noted = {
-        (str(name), round(stretch.start_s + float(at) + zero_s, 6)): float(lasts)
-        for stretch, each in zip(stretches, epochs.get_annotations_per_epoch(), strict=True)
-        for at, lasts, name in each
-    }
+    noted = {(str(name), round(stretch.start_s + float(at) + zero_s, 6)): float(lasts)
+             for stretch, each in zip(stretches, epochs.get_annotations_per_epoch(), strict=True)
+             for at, lasts, name in each}  # fmt: skip
     if epochs.metadata is not None:
         names = {code: name for name, code in epochs.event_id.items()}
         for code, stretch in zip(epochs.events[:, 2], stretches, strict=True):

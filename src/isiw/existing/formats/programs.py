@@ -69,8 +69,7 @@ def cfs(path: Path, _layout: Layout) -> Contents:
 
 def adicht(path: Path, _layout: Layout) -> Contents:
     """The channels and comments of a file of LabChart, by adi-reader; its records are apart."""
-    adi = library("adi", "import")
-    held = adi.read_file(str(path))
+    held = library("adi", "import").read_file(str(path))
     tracks, rows = list[Track](), list[tuple[str, float, float]]()
     for channel in held.channels:
         parts = [np.asarray(channel.get_data(n + 1), dtype=np.float64) for n in range(channel.n_records)]

@@ -66,8 +66,7 @@ def _events(raw: Any, index: int) -> list[tuple[str, float, float]]:
 
 def smrx(path: Path, _layout: Layout) -> Contents:
     """The waveforms, events and markers of a file of Spike2 8 and later, by CED's sonpy."""
-    sonpy = library("sonpy", "import")
-    held = sonpy.SonFile(str(path), bReadOnly=True)
+    held = library("sonpy", "import").SonFile(str(path), bReadOnly=True)
     tick_s, end = held.GetTimeBase(), held.MaxTime()
     tracks, rows = list[Track](), list[tuple[str, float, float]]()
     for channel in range(held.MaxChannels()):

@@ -56,7 +56,7 @@ def read(path: Path, _layout: Layout) -> Contents:
         elif own.form.startswith(("string", "int")) or any(word in own.kind for word in _OF_MARKERS):
             noted = zip(stream["time_series"], times_s.tolist(), strict=True)
             rows += [(text_of(*one), at, 0.0) for one, at in noted]
-    return Contents(path.name, tuple(tracks), events_of(rows), notes=tuple(notes))  # no EMG has numbers at no rate
+    return Contents(path.name, tuple(tracks), events_of(rows), notes=tuple(notes))
 
 
 class _Stream:
