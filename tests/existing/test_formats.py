@@ -46,13 +46,11 @@ from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
 
 NAMED = Layout(reference="impact", channels={"emg": "FCR"}, unmarked="alone")
-WORDED = {"XDF", "AcqKnowledge", "Spike2", "NWB"}
-"""Formats whose files have words that are known, in place of the names of `NAMES`."""
+WORDED = {"XDF", "AcqKnowledge", "Spike2", "NWB"}  # their files have words that are known instead of `NAMES`
 
 
 def read(path: Path, layout: Layout = NAMED) -> Delivered:
-    (person,) = read_people(path, layout)
-    return person
+    return read_people(path, layout)[0]
 
 
 @pytest.mark.parametrize("kind", RECORDINGS)

@@ -44,7 +44,7 @@ def crossed_out(sheet: Any) -> None:
         (crossed_out, "1 row of the sheet 'Data' is crossed out; got 'row 7'"),
         (lambda sheet: setattr(sheet["A8"], "comment", openpyxl.comments.Comment("Artefakt!", "EK")),
          "1 row of the sheet 'Data' is left out by a note; got 'row 8'"),
-        (lambda sheet: sheet.merge_cells("A4:A6"), "1 row of the sheet 'Data' is merged with others; got 'row 4'"),
+        (lambda sheet: sheet.merge_cells("B4:B6"), "an amplitude of the sheet 'Data' is merged over several rows"),
         (lambda sheet: sheet.__setitem__("B4", "=1/2"), "1 row .* without the result of a formula; got 'row 4'"),
     ],
 )  # fmt: skip
@@ -54,7 +54,9 @@ def test_rows_that_excel_shows_otherwise_than_they_are_read_are_asked_about(
     with pytest.raises(IsiwError, match=says):
         read_people(shown(tmp_path / "P01.xlsx", change), IMPACT)
     hidden_head = shown(tmp_path / "P02.xlsx", lambda sheet: setattr(sheet.row_dimensions[1], "hidden", True))
-    assert len(read_people(hidden_head, IMPACT)[0].trials) == 36
+    merged = shown(tmp_path / "P03.xlsx", lambda sheet: sheet.merge_cells("A4:A6"))
+    usual, of_one = (read_people(source, IMPACT)[0].trials for source in (hidden_head, merged))
+    assert (len(usual), len({trial.isi_ms for trial in of_one[2:5]})) == (36, 1)
 
 
 def test_a_unit_beside_numbers_is_theirs_in_a_table_and_in_a_structure_of_matlab(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain, islice, pairwise, zip_longest
 from pathlib import Path
@@ -36,7 +36,6 @@ _SHOWN_OTHERWISE: Final = (
      "Open the workbook in Excel or LibreOffice, and save it."),
     (rf'(?is)<comment ref="[A-Z]+(\d+)"(?:(?!</comment>).)*?<t[^>]*>\s*(?:{"|".join(WORDS["left out"])})[\s!.]*</t>',
      "left out by a note", _COUNT),
-    (r'<mergeCell ref="[A-Z]+(\d+):[A-Z]+(?!\1")\d+"', "merged with others", "Write into each row what holds for it."),
 )  # fmt: skip # in a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do
 
 
@@ -227,7 +226,8 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         raise InvalidValueError(what, got="; ".join(f"{name} ({cells})" for name, cells in held.items()), remedy=remedy)
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
-    _require_whole(book.book, chosen, heads[chosen])
+    merged = _require_whole(book.book, chosen, heads[chosen])
+    _fill_merged(rows, merged, heads[chosen] + (1 if layout.names else 0), layout, chosen)
     for cells in islice(book.book[chosen].iter_rows(), _LINES) if rows else ():
         shown = [_shown_in(cell.number_format) if isinstance(cell.value, int | float) else "" for cell in cells]
         if any(shown):  # Excel shows 1.2 as 120 %
@@ -237,8 +237,23 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     return _table(rows, layout, chosen)
 
 
-def _require_whole(book: Any, sheet: str, head: int) -> None:
-    """Raise if Excel shows rows below the head of a sheet otherwise than its cells are read."""
+def _fill_merged(rows: list[list[Any]], spans: Iterable[str], row_of_first: int, layout: Layout, sheet: str) -> None:
+    """Write what merged cells hold into each of their rows; an amplitude cannot be that of several trials."""
+    for span in spans:
+        column, first, _, last = library("openpyxl.utils", "import").range_boundaries(span)
+        column, first, last = column - 1, first - row_of_first, last - row_of_first
+        if not (0 if layout.names else 1) <= first < last or first >= len(rows) or column >= len(rows[0]):
+            continue  # beside each other, or not in the table
+        name = "" if layout.names else str(rows[0][column]).strip()
+        if name == layout.columns.get("mep") or letters(name) in COLUMNS["mep"]:
+            what, remedy = f"an amplitude of the sheet {sheet!r} is merged over several rows", "Write each row's own."
+            raise InvalidValueError(what, got=rows[first][column], remedy=remedy)
+        for row in rows[first + 1 : last + 1]:
+            row[column] = rows[first][column]
+
+
+def _require_whole(book: Any, sheet: str, head: int) -> list[str]:
+    """Which cells are merged; raise if Excel shows rows below the head of a sheet otherwise than they are read."""
     with book[sheet]._get_source() as file:  # noqa: SLF001 - openpyxl does not read it in another way, row by row
         content = file.read()
     notes = (book._archive.read(name) for name in book._archive.namelist() if "comment" in name)  # noqa: SLF001 - the same
@@ -252,6 +267,7 @@ def _require_whole(book: Any, sheet: str, head: int) -> None:
             what = f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}"
             got = f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}"
             raise InvalidValueError(what, got=got, remedy=remedy)
+    return [span.decode() for span in re.findall(rb'<mergeCell ref="([A-Z0-9:]+)"', content)]
 
 
 def _shown_in(number_format: str) -> str:
