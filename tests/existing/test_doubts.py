@@ -32,7 +32,6 @@ from isiw.existing.reading import read_people
 
 IMPACT = Layout(reference="impact")
 ISIS = np.repeat(np.arange(20.0, 181.0, 20.0), 4)
-
 TIMES = [f"2026-03-04 10:{n:02d}:00" for n in range(36)]
 
 
@@ -136,7 +135,8 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "the last rows twice": (pd.concat([table(), table()[-6:]]), {}, "or each row twice"),
     "a measured ISI beside": (table(measured_isi_ms=ISIS + 8), {}, "isi_ms or measured_isi_ms"),
     "before and after in a column called time": (table(time=of(["pre", "post"])), {}, "'time'.*(pre, post|post, pre)"),
-    "a word for ISIs of 0": (table(stim=np.where(ISIS > 20, "cond", "uncond")).replace(20.0, 0.0), {}, "--alone 0 if"),
+    "a word for ISIs of 0": (table(code=np.where(ISIS > 20, 2, 1), stim=np.where(ISIS > 20, "cond", "uncond"))
+                             .replace(20.0, 0.0), {}, "--alone 0 if"),
     "numbers of rows": (table().assign(isi_ms=np.arange(1.0, 37.0)), {}, "in the column 'isi_ms' are the numbers of"),
     "two columns of ISIs": (table(realised_isi_ms=ISIS + 40), {}, "isi_ms or realised_isi_ms"),
     "a unit beside that is another": (table(isi_unit=of(["s"])), {}, "'isi_ms .s.' says two units"),

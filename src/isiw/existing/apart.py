@@ -35,6 +35,7 @@ _BYTES_A_ROW: Final = 10  # a row of a table has hardly less
 _CHILD: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from isiw.existing.child import main; main()"
 """What the process runs: it finds what this one finds, and nothing in the folder in which it is started."""
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Each thread of a library for matrices takes memory of its own."""
 ANSWER: Final = "answer.json"
 SAMPLES: Final = "samples.f8"
 

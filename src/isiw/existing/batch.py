@@ -139,6 +139,7 @@ def code_in_names(subject: str) -> str:
 
 
 def _no_log_of_its_own(stem: str, times: int) -> InvalidValueError | None:
+    """Why a person's log can have no such name; None if it can."""
     if times > 1:
         what = "two of the people or days would have one log, here or on other systems"
         remedy = "Give each a code, or a day, of their own, that differs in more than capitals."

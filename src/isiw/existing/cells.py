@@ -147,11 +147,8 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
             raise column.doubted(why, stated, remedy, expected)
         if usual is None and not signs[key] and (doubtful := _doubtful(column)):
             sign = "comma" if "," in doubtful else "point"
-            why, remedy = (
-                f"has a {sign} that may be a decimal sign, or group thousands",
-                "Say --decimal , or --decimal .",
-            )
-            raise column.doubted(why, doubtful, remedy)
+            why = f"has a {sign} that may be a decimal sign, or group thousands"
+            raise column.doubted(why, doubtful, "Say --decimal , or --decimal .")
         found[key] = replace(column, decimal=max(signs[key], key=",.".find, default=usual or "."))
     return found
 
@@ -177,10 +174,8 @@ def required_unit(layout: Layout, known: Mapping[str, float], said: str | None, 
     """The unit of something: the one that is stated, or else the one that the file says."""
     unit = layout.unit_of(known) or said
     if unit is None or unit not in known:
-        units, what = (
-            "ms or s" if known is ISI_UNITS_MS else "mV, uV or V",
-            f"the unit of {what} is not stated or unknown",
-        )
+        units = "ms or s" if known is ISI_UNITS_MS else "mV, uV or V"
+        what = f"the unit of {what} is not stated or unknown"
         raise InvalidValueError(what, got=got, remedy=f"Say --unit with {units}.")
     return unit
 

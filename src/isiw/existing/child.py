@@ -59,8 +59,10 @@ def _answer(request: Mapping[str, Any], folder: Path) -> None:
         contents = contents_in(path, layout, limits)
         if contents.trials is not None:  # for so many rows, of which trials are made, there is more time
             limit("CPU", seconds_for(limits, path, table=True, rows=len(contents.trials)))
-        people = [] if request["look"] else people_of_contents(contents, path, layout, request["subject"], limits)
-        found = seen_in(contents, path, layout, limits) if request["look"] else Answer(people, {})
+        if request["look"]:
+            found = seen_in(contents, path, layout, limits)
+        else:
+            found = Answer(people_of_contents(contents, path, layout, request["subject"], limits), {})
     finally:
         gate.require_nothing_refused()
     write_answer(folder, found, gate.hashes())

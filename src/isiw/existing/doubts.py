@@ -193,11 +193,9 @@ def require_short(delivered: Delivered, layout: Layout) -> None:
     usual_ms = statistics.median(trial.isi_ms for trial in delivered.trials if trial.isi_ms is not None)
     if usual_ms > layout.longest_isi_ms:
         what = f"the ISIs of {delivered.source} are longer than those of paired stimulation"
-        remedy = (
-            "Are they in another unit (--unit), or numbers of samples, or times between trials? If they are right, "
-        )
         got, expected = f"{usual_ms:g} ms in the median", f"at most {layout.longest_isi_ms:g} ms"
-        remedy += "write longest_isi_ms = NUMBER into a layout."
+        remedy = "Are they in another unit (--unit), or numbers of samples, or times between trials? If they are "
+        remedy += "right, write longest_isi_ms = NUMBER into a layout."
         raise InvalidValueError(what, got=got, expected=expected, remedy=remedy)
 
 
@@ -343,10 +341,8 @@ def _require_one_intensity(columns: Columns) -> None:
         of_pairs = {text: None for row in columns.paired if rows and (text := column.text(row))}
         others = dict.fromkeys(text for row in rows if (text := column.text(row)) not in {"", *of_pairs})
         if of_pairs and others:
-            remedy = (
-                f'Say --where "{name}={next(iter(of_pairs))}", or name a column in % of the resting motor threshold '
-            )
-            remedy += f'by --column intensity=NAME; to analyse all together, say --where "{name}={ALL}".'
+            remedy = f'Say --where "{name}={next(iter(of_pairs))}", or name a column in % of the resting motor '
+            remedy += f'threshold by --column intensity=NAME; to analyse all, say --where "{name}={ALL}".'
             raise column.doubted("says other intensities of TMS alone than of pairs", ", ".join([*others][:5]), remedy)
 
 
@@ -355,8 +351,9 @@ def _is_named(columns: Columns, isi_ms: float) -> bool:
     of_isi = {row for row in columns.rows if columns["isi"].number(row) == isi_ms}
     for column in columns.beside.values():
         words = {column.text(row) for row in of_isi}
-        if len(words) == 1 and words.isdisjoint(column.text(row) for row in {*columns.rows} - of_isi):
-            return not next(iter(words)).isdigit()
+        others = {column.text(row) for row in {*columns.rows} - of_isi}
+        if len(words) == 1 and words.isdisjoint(others) and not next(iter(words)).isdigit():
+            return True
     return False
 
 

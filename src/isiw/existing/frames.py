@@ -159,10 +159,8 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     for number, row in enumerate(body, 1):
         if not all(is_missing(cell) for cell in row[len(names) :]):
             what = f"row {number} has {len(row)} cells, but there are {len(names)} names: no table that can be read"
-            remedy = (
-                "Is a decimal comma also what separates the cells? Save the file with another separator. If it has "
-            )
-            remedy += "samples, describe it in a layout, as docs/your-data.md does (--layout)."
+            remedy = "Is a decimal comma also what separates the cells? Save the file with another separator. If it "
+            remedy += "has samples, describe it in a layout, as docs/your-data.md does (--layout)."
             raise InvalidValueError(what, got=" | ".join(map(str, row[: len(names) + 2])), remedy=remedy)
     table = pd.DataFrame([[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body], columns=names)
     table.attrs["title"] = title
@@ -239,12 +237,13 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
 
 def _fill_merged(rows: list[list[Any]], spans: Iterable[str], row_of_first: int, layout: Layout, sheet: str) -> None:
     """Write what merged cells hold into each of their rows; an amplitude cannot be that of several trials."""
+    names = [*layout.names] or [str(name).strip() for name in rows[0]] if rows else []
     for span in spans:
         column, first, _, last = library("openpyxl.utils", "import").range_boundaries(span)
         column, first, last = column - 1, first - row_of_first, last - row_of_first
-        if not (0 if layout.names else 1) <= first < last or first >= len(rows) or column >= len(rows[0]):
+        if not (0 if layout.names else 1) <= first < min(last, len(rows)) or column >= len(names):
             continue  # beside each other, or not in the table
-        name = "" if layout.names else str(rows[0][column]).strip()
+        name = names[column]
         if name == layout.columns.get("mep") or letters(name) in COLUMNS["mep"]:
             what, remedy = f"an amplitude of the sheet {sheet!r} is merged over several rows", "Write each row's own."
             raise InvalidValueError(what, got=rows[first][column], remedy=remedy)

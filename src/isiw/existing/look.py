@@ -114,23 +114,27 @@ def _reference(contents: Contents) -> Reference:
 
 
 def _of_recording(contents: Contents, triggers: Mapping[str, FloatArray]) -> Iterator[str]:
-    names = names_of(contents.events)
     for track in contents.tracks[:_MOST]:
         said = ", ".join(filter(None, [track.unit or "no unit", f"{track.rate_hz:.6g} Hz", track.kind, _gaps(track)]))
         trigger = f"; a trigger? {_times(triggers[track.name])}" if track.name in triggers else ""
         yield f"  channel {track.name!r}: {said}{trigger}"
-    yield from (f"  event {name!r}: {_times(times_of(contents.events, name))}" for name in names[:_MOST])
-    for kind, more in (("channel", len(contents.tracks) - _MOST), ("name of events", len(names) - _MOST)):
-        yield from [f"  and {counted(more, f'other {kind}')}"] if more > 0 else ()
-    yield from () if names or triggers else ["  no events"]
+    if len(contents.tracks) > _MOST:
+        yield f"  and {counted(len(contents.tracks) - _MOST, 'other channel')}"
+    names = names_of(contents.events)
+    for name in names[:_MOST]:
+        yield f"  event {name!r}: {_times(times_of(contents.events, name))}"
+    if len(names) > _MOST:
+        yield f"  and {counted(len(names) - _MOST, 'other name', 'other names')} of events"
+    if not names and not triggers:
+        yield "  no events"
 
 
 def _gaps(track: Track) -> str:
+    """How long a channel lasts, and where it has gaps."""
     lasts_s = sum(stretch.samples for stretch in track.stretches) / track.rate_hz
-    second = [
-        f" in {len(track.stretches)} parts, the second from {one.start_s:.1f} s on" for one in track.stretches[1:2]
-    ]
-    return "".join([f"{lasts_s:.1f} s", *second])
+    if len(track.stretches) == 1:
+        return f"{lasts_s:.1f} s"
+    return f"{lasts_s:.1f} s in {len(track.stretches)} parts, the second from {track.stretches[1].start_s:.1f} s on"
 
 
 def _times(at_s: FloatArray) -> str:
@@ -143,11 +147,13 @@ def _times(at_s: FloatArray) -> str:
 def _triggers(contents: Contents) -> Iterator[tuple[str, FloatArray]]:
     """Channels of two levels, by when they leave the one at which they mostly are [s]."""
     for track in contents.tracks:
-        _, values, _ = next(track.pieces(), (0.0, np.zeros(1), 0.0))
-        low, high = values.min(), values.max()
+        first = None if track.kind == "emg" else next(track.pieces(), None)
+        if first is None:
+            continue
+        low, high = (values := first[1]).min(), values.max()
         between = (values > low + 0.1 * (high - low)) & (values < high - 0.1 * (high - low))
         with suppress(IsiwError):  # of levels of which neither is rest
-            if track.kind != "emg" and high > low and between.mean() < _TRIGGER and len(at_s := track.onsets_s()) > 1:
+            if high > low and between.mean() < _TRIGGER and len(at_s := track.onsets_s()) > 1:
                 yield track.name, np.asarray(at_s)
 
 
@@ -161,23 +167,28 @@ def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout
     several = [name for name, at_s in times.items() if len(at_s) > 1 and not re.match("(?i)bad|sweep", name)]
     shares = dict[tuple[str, str], float]()
     for tap, pulse in permutations(several[:_MOST], 2):  # how many pulses follow a tap within the longest ISI
-        after_s = times[pulse] - times[tap][np.maximum(np.searchsorted(times[tap], times[pulse], side="right") - 1, 0)]
+        before = np.searchsorted(times[tap], times[pulse], side="right") - 1
+        after_s = times[pulse] - times[tap][np.maximum(before, 0)]
         shares[tap, pulse] = float(((after_s >= 0) & (after_s <= layout.longest_isi_ms / 1e3)).mean())
     pair = max(shares, key=lambda both: shares[both], default=None)
     if pair is None or shares[pair] < 0.5:
         return layout
-    said = dict(zip((key, "pulse"), pair, strict=True))  # of triggers if there are no events that a marker could be of
-    return replace(layout, markers={}).saying(channels=said) if triggers else layout.saying(markers=said)
+    said = dict(zip((key, "pulse"), pair, strict=True))
+    if triggers:  # and no events that a marker could be of
+        return replace(layout, markers={}).saying(channels=said)
+    return layout.saying(markers=said)
 
 
 def _of_table(contents: Contents, layout: Layout) -> Iterator[str]:
     frame = named(contents.trials)
-    held = dict[str, str]()
-    with suppress(IsiwError):
+    try:
         found = Columns.found(frame, replace(layout, units=layout.units or ("ms", "mV")), contents.source)
         held = {column.name.partition(" (")[0]: key for key, column in found.of.items()}
+    except IsiwError:
+        held = {}
     for place, name in enumerate(frame.columns[:_MOST]):
-        kinds = [*dict.fromkeys(map(str, frame.iloc[:, place].tolist()))]
+        cells = frame.iloc[:, place]
+        kinds = list(dict.fromkeys(map(str, cells.tolist())))
         some = ", ".join(kinds[:4]) + (f" … ({len(kinds)} different)" if len(kinds) > 4 else "")
         key = held.get(str(name), held.get(str(name).partition(" (")[0]))
         yield f"  column {str(name)!r}{f', the {key}' if key else ''}: {some}"
@@ -185,6 +196,7 @@ def _of_table(contents: Contents, layout: Layout) -> Iterator[str]:
 
 
 def _command(path: Path, layout: Layout) -> str:
+    """The command line that says a layout."""
     words = ["analyse", str(path)]
     for option in ("reference", "alone", "decimal", "sheet", "unmarked"):
         if (value := getattr(layout, option)) is not None:

@@ -54,6 +54,7 @@ def names_of(events: pd.DataFrame) -> list[str]:
 
 
 def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
+    """The names of the events that mark something."""
     if key in layout.channels:
         return [key]
     names = names_of(events)
@@ -68,12 +69,13 @@ def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str 
     """The name of the events that mark something; None if none of them does."""
     fitting = _fitting(events, key, layout)
     if key in layout.markers and len(fitting) != 1:
-        what = f"{source} has {'several events' if fitting else 'no event'} of this name"
-        expected = ", ".join(map(repr, names_of(events)))
-        raise InvalidValueError(what, got=layout.markers[key], expected=f"one of {expected}")
+        what = "several events" if fitting else "no event"
+        expected = f"one of {', '.join(map(repr, names_of(events)))}"
+        raise InvalidValueError(f"{source} has {what} of this name", got=layout.markers[key], expected=expected)
     if len(fitting) > 1:
-        what, got = f"events of {len(fitting)} names in {source} may mark {MARKS[key][0]}", ", ".join(fitting)
-        raise InvalidValueError(what, got=got, remedy=f'Say --marker "{key}={fitting[0]}", or give all one name.')
+        what = f"events of {len(fitting)} names in {source} may mark {MARKS[key][0]}"
+        remedy = f'Say --marker "{key}={fitting[0]}", or give all that mark it one name.'
+        raise InvalidValueError(what, got=", ".join(fitting), remedy=remedy)
     return fitting[0] if fitting else None
 
 
@@ -100,8 +102,10 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
     alone_s = times_of(events, None if alone_name in {pulse_name, origin_name} else alone_name)
     more_s = [at for at in alone_s.tolist() if not np.any(np.abs(at_s - at) <= _SAME_PULSE_S)]
     epochs = events[events["name"].astype(str) == "sweep"]
-    pulses = [_placed(at, origins_s, epochs, alone=bool(np.any(np.abs(alone_s - at) <= _SAME_PULSE_S)), layout=layout)
-              for at in sorted([*at_s.tolist(), *more_s])]  # fmt: skip
+    pulses = [
+        _placed(at, origins_s, epochs, alone=bool(np.any(np.abs(alone_s - at) <= _SAME_PULSE_S)), layout=layout)
+        for at in sorted([*at_s.tolist(), *more_s])
+    ]
     _require_one_each(pulses, origins_s, layout, source)
     return _with_the_unmarked(pulses, layout, source)
 
@@ -115,9 +119,9 @@ def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout
         came_s = None if pulse.origin_s is None else round(pulse.origin_s, 9)
         shared = came_s is not None and came_s == last_came_s
         if taps > 1 or shared:
-            what = (
-                f"two pulses of {source} have one tap" if shared else f"{taps} taps of {source} come before one pulse"
-            )
+            what = f"two pulses of {source} have one tap"
+            if not shared:
+                what = f"{taps} taps of {source} come before one pulse"
             expected = f"one of each within {layout.longest_isi_ms:g} ms"
             remedy = "Leave out the events that mark no stimulus, such as a second edge, or give them another name."
             raise InvalidValueError(what, got=f"at {pulse.at_s:.3f} s", expected=expected, remedy=remedy)
@@ -143,7 +147,8 @@ def _with_the_unmarked(pulses: list[Pulse], layout: Layout, source: str) -> list
     """Pulses of which the file says whether a tap came, or the operator does."""
     paired = [pulse for pulse in pulses if pulse.isi_s is not None]
     if both := [pulse for pulse in paired if pulse.alone]:
-        what = f"an event of {source} says TMS alone, and a tap came {1e3 * (both[0].isi_s or 0):.0f} ms before it"
+        came_ms = 1e3 * (both[0].isi_s or 0.0)
+        what = f"an event of {source} says TMS alone, and a tap came {came_ms:.0f} ms before the pulse"
         remedy = "Are both markers the right ones? Say --marker alone=NAME and --marker tap=NAME."
         raise InvalidValueError(what, got=f"at {both[0].at_s:.3f} s", remedy=remedy)
     if (early := sum((pulse.isi_s or 0.0) < 0 for pulse in paired)) > 2 and 2 * early > len(paired):

@@ -16,6 +16,7 @@ from isiw.findings import Kind
 from isiw.lazy import pd
 
 _ASKED: Final = frozenset({"isi", "mep", "status", "exclude"})  # of which there may be two, that say different things
+_MANY: Final = 5000  # so many trials has no person
 _OF_ISIS: Final = "Correct it; if it is TMS alone, say --alone with it; or name another column: --column isi=NAME."
 
 
@@ -107,8 +108,8 @@ def _require_held(missing: Sequence[str], frame: pd.DataFrame, source: str) -> N
         got = ", ".join(str(name) for name in frame.columns if str(name).strip()) or "no names"
         remedy = f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file (--layout); '
         remedy += "if each ISI has a column, or each trial, write a row for each trial."
-        if len(frame) > 5000:  # so many trials has nobody
-            remedy = "If these are samples, a row each, say --channel emg=NAME, and write rate_hz into a layout."
+        if len(frame) > _MANY:
+            remedy += " If these are samples, a row each, say --channel emg=NAME, and write rate_hz into a layout."
         raise InvalidValueError(what, got=got, remedy=remedy)
 
 

@@ -61,7 +61,8 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     bad = contents.events[contents.events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         sweep = _cut(signals, pulse, pulse.at_s - _BEFORE_S - longest_s, key)
-        sweeps |= {number: sweep.channels} if sweep.channels else {}
+        if sweep.channels:
+            sweeps[number] = sweep.channels
         for isi_ms in isis_of(pulse.said) if pulse.isi_s is not None else ():
             _require_same(f"the trial at {pulse.at_s:.3f} s of {source}", isi_ms, pulse.isi_s)
         if pulse.lost:
@@ -73,7 +74,8 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         begin_s, end_s = min(pulse.at_s - _BEFORE_S, pulse.origin_s or pulse.at_s), pulse.at_s + _AFTER_S
         is_bad = bool(((bad["onset"] <= end_s) & (bad["onset"] + bad["duration"] >= begin_s)).any())
         trials.append(replace(judged, excluded=is_bad or pulse.said.get("excluded") in {True, "true", "True"}))
-        seen += [(sweep, judged)] if trials[-1].told else []
+        if trials[-1].told:
+            seen.append((sweep, judged))
     if trials and not seen:
         got = ", ".join(sorted({str(trial.reason) for trial in trials if trial.reason})) or "excluded ones"
         remedy = " ".join([*contents.notes, _IF_NONE_COUNTS.format(limits.background_uv)])
@@ -111,10 +113,9 @@ def _require_within(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, s
     if len(seen) > _FEW and (not usual or (2 * len(odd_ms) > len(responses_ms) and 4 * len(odd_ms) > len(seen))):
         what = f"most responses in {source} are not within {first_ms:g}–{last_ms:g} ms after the pulse, where MEPs are "
         got = f"{len(odd_ms)} of {len(seen)}, about {np.median(odd_ms):.0f} ms after it" if odd_ms else "none at all"
-        remedy = (
-            "Does its marker, or time 0, come at the pulse? If so, write the muscle's mep_window_ms = [FIRST, LAST] "
-        )
-        raise InvalidValueError(f"{what}measured", got=got, remedy=f"{remedy}into a layout.")
+        remedy = "Does its marker, or time 0, come at the pulse? If so, write the muscle's "
+        remedy += "mep_window_ms = [FIRST, LAST] into a layout."
+        raise InvalidValueError(f"{what}measured", got=got, remedy=remedy)
 
 
 def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[str, Track], str]:

@@ -252,7 +252,8 @@ def test_who_vanishes_while_news_is_put_together_is_written_to_no_more(
 
     def shown_to_nobody(view: View) -> Shown:
         shown = _larger_than_any_buffer(view)
-        for viewer in viewers:
+        while viewers:
+            viewer = viewers.pop()
             viewer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # gone at once
             viewer.close()
         return shown
