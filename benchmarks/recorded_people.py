@@ -38,6 +38,8 @@ NO_FLOOR: Final = EmgFloor(1e-6, 0.0)
 
 ADDED_MV: Final = 0.002
 """What is added to an amplitude before its logarithm is taken [mV]."""
+LEAST_MV: Final = 2e-4
+"""No smaller amplitude is drawn: no amplifier shows it, and a strategy refuses it [mV]."""
 LEAST_PULSES, LEAST_LEVELS = 3, 5
 """Curves with fewer pulses at a level, or with fewer levels, are left out."""
 
@@ -103,7 +105,7 @@ class Bank:
         if self.kernel_log_sds is None:
             return drawn_mv
         factor = float(np.exp(self.kernel_log_sds[number] * rng.standard_normal()))
-        return max(0.0, (drawn_mv + ADDED_MV) * factor - ADDED_MV)
+        return max(LEAST_MV, (drawn_mv + ADDED_MV) * factor - ADDED_MV)
 
 
 @cache
