@@ -12,6 +12,7 @@ from isiw.models.particles import jumps, latents
 from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.compiled import Law
 from isiw.models.particles.latents import Latents
+from isiw.models.particles.levels import CARRIED
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
@@ -21,7 +22,7 @@ from isiw.models.particles.supra import prior as supra_prior
 from isiw.models.shared.history import Circumstances, History
 from isiw.models.shared.scales import Scale
 from isiw.native import engine
-from isiw.native.engine import COLUMNS
+from isiw.native.engine import COLUMNS, RESPONSE_LEVELS
 from isiw.types import IntArray, Singles
 from native import reference
 
@@ -30,11 +31,15 @@ PLACES: Final = ProfilePrior(
 )
 
 
+OF_LEVELS: Final = tuple(f"level_{name}_{level}" for name in ("at", "mean", "sd") for level in range(RESPONSE_LEVELS))
+
+
 class Case(NamedTuple):
     """A prior in a space."""
 
     prior: Any
     space: DesignSpace
+    by_levels: bool = False  # whether particles may have a law by levels
 
     @property
     def supra(self) -> bool:
@@ -44,24 +49,30 @@ class Case(NamedTuple):
     @property
     def law(self) -> Law:
         """The prior as the engine has it."""
-        law: Law = (supra_jumps if self.supra else jumps).law_of(self.prior, self.space)
-        return law
+        if self.supra:
+            return supra_jumps.law_of(self.prior, self.space)
+        return jumps.law_of(self.prior, self.space, by_levels=self.by_levels)
 
     def drawn(self, particles: int, seed: int, people: int = 1) -> Latents:
-        """Particles of the prior."""
-        return Latents(*self.law.draws(particles, seeds(seed, people)))
+        """Particles of the prior; levels are any."""
+        made = Latents(*self.law.draws(particles, seeds(seed, people)))
+        if self.by_levels:
+            rng, shape = np.random.default_rng(seed), (people, particles, RESPONSE_LEVELS)
+            places, sds = np.cumsum(rng.uniform(0.5, 9.0, shape), -1) - 4.0, rng.uniform(0.1, 1.2, shape)
+            made.values[..., -CARRIED:] = np.concatenate((places, rng.normal(-3.5, 1.0, shape), sds), axis=-1)
+        return made
 
     def of_all_kinds(self, particles: int, seed: int) -> Latents:
         """Particles of one person, all kinds of them as often."""
         rng, made = np.random.default_rng(seed), self.drawn(particles, seed)
-        kinds = {"shape": 4, "noise": len(NoiseKind), "present": 2, "change": len(ChangeKind)}
+        kinds = {"shape": 4, "noise": len(NoiseKind) - (not self.by_levels), "present": 2, "change": len(ChangeKind)}
         for name, number in ({"present": 2, "depressed": 2} if self.supra else kinds).items():
             made = made.with_kind(name, rng.integers(number, size=(1, particles)))
         return made
 
     def particles(self, made: Latents, person: int = 0) -> list[reference.Particle]:
         """One person's particles as the reference has them."""
-        names = supra_prior.LATENTS if self.supra else latents.LATENTS
+        names = supra_prior.LATENTS if self.supra else (*latents.LATENTS, *(OF_LEVELS if self.by_levels else ()))
         each = zip(made.values[person].tolist(), made.kinds[person].tolist(), strict=True)
         return [reference.Particle.of(names, values, kinds) for values, kinds in each]
 
@@ -73,6 +84,7 @@ class Case(NamedTuple):
 CASES: Final = {
     "default": Case(Prior(), VALVE_SPACE),
     "places": Case(Prior(PLACES), VALVE_SPACE),
+    "by levels": Case(Prior(), VALVE_SPACE, by_levels=True),
     "supra": Case(supra_prior.SupraPrior(), DesignSpace(0, 200, reference="impact")),
 }
 

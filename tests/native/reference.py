@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -36,8 +36,9 @@ FIRST_GROUP_MS, GROUP_MS, GROUPS = -150.0, 15.0, 64  # trials that share a facto
 LEAST_MASS: Final = 1e-9
 EDGE_LEVEL, LEAST_MV, LEAST_OF_BASELINE, NOWHERE = 0.135, 0.002, 0.1, 2.0
 PEAKS: Final = (0.27, 0.73)
+LEVELS, NO_FLOOR_SD = 8, math.exp(-7.0)  # of a law by levels: how many, and the SD of its floor
 
-CONSTANT_CV, MISSING, RECRUITMENT, ALL_OR_NONE, RECTIFIED = range(5)
+CONSTANT_CV, MISSING, RECRUITMENT, ALL_OR_NONE, RECTIFIED, BY_LEVELS = range(6)
 GAUSSIAN, SKEWED, PLATEAU, TWO_PEAK = range(4)
 NO_CHANGE, LEVEL, INTENSITY, ENHANCEMENT, SCALE = range(5)
 
@@ -87,10 +88,19 @@ class Particle:
         """Whether it has a recruitment curve."""
         return self.noise in {RECRUITMENT, RECTIFIED}
 
+    @property
+    def knows_intensities(self) -> bool:
+        """Whether it knows what pulses of another intensity evoke."""
+        return self.curved or self.noise == BY_LEVELS
+
+    def levels(self, name: str) -> Values:
+        """Places, means or SDs of its levels, (8,)."""
+        return np.array([self.z[f"{name}_{level}"] for level in range(LEVELS)])
+
     def changed(self, order: int, kind: int) -> float:
         """The size of a change of a kind that has come by a trial, else 0; what is not a curve's is a level."""
         own = self.change
-        if own == INTENSITY and not self.curved:
+        if own == INTENSITY and not self.knows_intensities:
             own = LEVEL
         there = own == kind and order >= math.exp(self.z["log_changed_after"])
         return self.z["change_size"] if there else 0.0
@@ -187,8 +197,22 @@ def log_ratio_of(particle: Particle) -> float:
 
 
 def log_floor_of(particle: Particle, order: int) -> float:
-    """Log of the median of the EMG floor at a trial [log mV]."""
-    return particle.z["log_floor_mv"] + particle.changed(order, SCALE)
+    """Log of the median of the EMG floor at a trial [log mV]; of a law by levels it is the lowest level."""
+    lowest = particle.levels("level_mean").min() if particle.noise == BY_LEVELS else particle.z["log_floor_mv"]
+    return float(lowest + particle.changed(order, SCALE))
+
+
+def floor_sd_of(particle: Particle) -> float:
+    """Log SD of the EMG floor."""
+    return NO_FLOOR_SD if particle.noise == BY_LEVELS else math.exp(particle.z["log_floor_sd"])
+
+
+def levels_at(particle: Particle, level: float, shift_pct_rmt: float) -> tuple[Values, Values, Values]:
+    """Share of each level at a facilitation, the nearer of two the more; what they evoke, in floors; their SDs."""
+    stronger = math.exp(particle.z["log_boost"]) * level + shift_pct_rmt
+    place = np.interp(stronger, particle.levels("level_at"), np.arange(LEVELS))
+    evoked = np.exp(particle.levels("level_mean") - particle.levels("level_mean").min()) - 1.0
+    return np.maximum(0.0, 1.0 - np.abs(np.arange(LEVELS) - place)), evoked, particle.levels("level_sd")
 
 
 @dataclass(frozen=True)
@@ -198,11 +222,12 @@ class Outcome:
     chance: float  # of a response
     responses: tuple[Values, Values]  # means and SDs, (q,)
     silent: tuple[float, float]  # mean and SD of the floor alone
+    weights: Values = field(default_factory=lambda: WEIGHTS)  # of the nodes, or of levels in their place, (q,)
 
     def density(self, log_mep: float) -> float:
         """Density at a log MEP over the floor."""
         first, last = OUTLIER_LOG_RANGE
-        evoked = (WEIGHTS * density_at(*self.responses, log_mep)).sum()
+        evoked = (self.weights * density_at(*self.responses, log_mep)).sum()
         mixed = self.chance * evoked + (1.0 - self.chance) * density_at(*self.silent, log_mep)
         outlier = (first < log_mep < last) / (last - first) + 1e-6
         return float((1.0 - OUTLIERS) * mixed + OUTLIERS * outlier)
@@ -210,7 +235,7 @@ class Outcome:
     def mass(self, low: float, high: float) -> float:
         """Probability between two log MEPs over the floor."""
         first, last = OUTLIER_LOG_RANGE
-        mixed = self.chance * (WEIGHTS * between_ends(*self.responses, low, high)).sum()
+        mixed = self.chance * (self.weights * between_ends(*self.responses, low, high)).sum()
         mixed += (1.0 - self.chance) * between_ends(*self.silent, low, high)
         outlier = np.diff(np.clip((np.array([low, high]) - first) / (last - first), 0.0, 1.0)).item()
         return float(max((1.0 - OUTLIERS) * mixed + OUTLIERS * outlier, LEAST_MASS))
@@ -221,13 +246,18 @@ def outcome_of(particle: Particle, trial: Trial, level: float, factor: float = 1
     z, order = particle.z, trial.order
     per_floor = factor * math.exp(-log_floor_of(particle, order))
     known, known_sd = per_floor * trial.known_mv, per_floor * trial.known_sd_mv
-    floor_variance = math.exp(z["log_floor_sd"]) ** 2 + known_sd**2
+    floor_variance = floor_sd_of(particle) ** 2 + known_sd**2
+    silent = math.log1p(known), math.sqrt(floor_variance) / (1.0 + known)
     shift_pct_rmt = trial.shift_pct_rmt + INTENSITY_PCT * particle.changed(order, INTENSITY)
-    drive, chance = drive_and_chance(particle, level * particle.enhancement(order), shift_pct_rmt)
+    level *= particle.enhancement(order)
     startle = STARTUP[order] if order < len(STARTUP) else 0.0
-    log_ratio = log_ratio_of(particle) + (0.0 if particle.curved else FAR_BELOW)
-    log_ratio += z["drift"] * (1.0 - PERSISTENCE**order) + z["startup"] * startle
-    log_ratio += particle.changed(order, LEVEL)
+    gain = z["drift"] * (1.0 - PERSISTENCE**order) + z["startup"] * startle + particle.changed(order, LEVEL)
+    if particle.noise == BY_LEVELS:
+        weights, evoked, sds = levels_at(particle, level, shift_pct_rmt)
+        total = 1.0 + evoked * math.exp(gain) + known
+        return Outcome(1.0, (np.log(total), np.sqrt(sds**2 + floor_variance / total**2)), silent, weights)
+    drive, chance = drive_and_chance(particle, level, shift_pct_rmt)
+    log_ratio = log_ratio_of(particle) + gain + (0.0 if particle.curved else FAR_BELOW)
     spread, between = nodes_of(particle)
     share, onset = scipy.special.expit(drive + spread), onset_of(particle)
     varies = (1.0 - share) ** 2 * between
@@ -239,7 +269,7 @@ def outcome_of(particle: Particle, trial: Trial, level: float, factor: float = 1
     evoked = share * math.exp(log_ratio)
     total = 1.0 + evoked + known
     responses = np.log(total), np.sqrt(evoked**2 * (varies + output) + floor_variance) / total
-    return Outcome(chance, responses, (math.log1p(known), math.sqrt(floor_variance) / (1.0 + known)))
+    return Outcome(chance, responses, silent)
 
 
 def density_at(mean: Values | float, sd: Values | float, at: float) -> Values:
@@ -256,7 +286,7 @@ def between_ends(mean: Values | float, sd: Values | float, low: float, high: flo
 
 def likelihood(particle: Particle, trial: Trial, factor: float = 1.0) -> float:
     """Density of a log MEP, or the probability of an interval, to a power; an ISI known with an SD integrated out."""
-    if not (particle.curved or math.isnan(trial.log_by_curves)):
+    if not (particle.knows_intensities or math.isnan(trial.log_by_curves)):
         return math.exp(trial.log_by_curves)
     floor, found = log_floor_of(particle, trial.order), 0.0
     for at, weight in ISI_NODES if trial.isi_sd_ms > 0 else ((0.0, 1.0),):
@@ -300,6 +330,10 @@ def row_of(level: Values, depth: float, rows: int) -> Values:
 def expected_evoked(particle: Particle, order: int, level: float) -> float:
     """Expected MEP above the floor at a facilitation, in medians of the floor; drift and startle aside."""
     shift_pct_rmt = INTENSITY_PCT * particle.changed(order, INTENSITY)
+    if particle.noise == BY_LEVELS:
+        shares, evoked, sds = levels_at(particle, level * particle.enhancement(order), shift_pct_rmt)
+        above = (shares * (1.0 + evoked) * np.exp(0.5 * sds**2)).sum() - 1.0
+        return float(math.exp(particle.changed(order, LEVEL)) * above)
     drive, chance = drive_and_chance(particle, level * particle.enhancement(order), shift_pct_rmt)
     ratio = math.exp(log_ratio_of(particle) + particle.changed(order, LEVEL))
     if not particle.curved:
@@ -311,7 +345,7 @@ def expected_evoked(particle: Particle, order: int, level: float) -> float:
 
 def expected_mep_mv(particle: Particle, order: int, evoked: float) -> float:
     """Expected MEP [mV], by what is evoked above the floor."""
-    mean_floor = math.exp(0.5 * math.exp(2.0 * particle.z["log_floor_sd"]))
+    mean_floor = math.exp(0.5 * floor_sd_of(particle) ** 2)
     return math.exp(log_floor_of(particle, order)) * (evoked + mean_floor)
 
 

@@ -16,6 +16,7 @@ from isiw.design import DesignSpace
 from isiw.models.particles.changes import ChangePrior
 from isiw.models.particles.compiled import Asking, Crowd
 from isiw.models.particles.latents import Latents
+from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.places import Place
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
@@ -55,6 +56,8 @@ def history(trials: int, seed: int, particular: str = "") -> History:
 def computed(case: Case, particles: int, told: History) -> Latents:
     """What the engine computes of particles: draws, likelihood, weights, moves, prior and meaning."""
     law, drawn, dice = case.law, case.drawn(particles, particles), seeds(particles)
+    if case.by_levels:
+        drawn = drawn.with_kind("noise", np.where(np.arange(particles) % 2, NoiseKind.BY_LEVELS, drawn.noise))
     equal, nothing = np.full((1, particles), -np.log(particles)), law.nothing_known(1, particles)
     state = *drawn, log_likelihoods(case.fields(drawn), told.columns), nothing
     sweeps(law, np.array([2]), told.columns, dice, state)
@@ -98,14 +101,16 @@ def with_places(number: int) -> Prior:
 
 def main() -> None:
     """Compute at all sizes."""
-    usual, supra = Case(Prior(), SPACE), Case(SupraPrior(), SPACE)
+    usual, supra, by_levels = Case(Prior(), SPACE), Case(SupraPrior(), SPACE), Case(Prior(), SPACE, by_levels=True)
     for trials in TRIALS:
         for number, particular in enumerate(("points", "mixed", "known")):
-            computed(usual, 4, history(trials, trials + number, particular))
+            for case in (usual, by_levels):
+                computed(case, 4, history(trials, trials + number, particular))
     for particles in PARTICLES:
-        predicted(usual, computed(usual, particles, history(9, particles, "known")))
+        for case in (usual, by_levels):
+            predicted(case, computed(case, particles, history(9, particles, "known")))
         computed(supra, particles, history(9, particles))
-    for case in (usual, supra):
+    for case in (usual, by_levels, supra):
         latents = computed(case, 17, history(9, 1))
         for space in spaces(ISIS):
             predicted(case._replace(space=space), latents)

@@ -22,7 +22,7 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.shared.draws import LEVELS
 from isiw.models.shared.history import Circumstances
 from isiw.native import engine
-from isiw.native.engine import COLUMNS, FIELDS, UNKNOWN, log_likelihoods
+from isiw.native.engine import COLUMNS, FIELDS, RESPONSE_LEVELS, UNKNOWN, log_likelihoods
 from native import reference
 from native.drawn import CASES, PLACES, Case, columns, seeds, sweeps, trials
 
@@ -48,7 +48,7 @@ def test_the_engine_has_the_law_of_the_reference(name: str, known_log_sd: float)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "number"), [("default", 10_000), ("supra", 3_000)])
+@pytest.mark.parametrize(("name", "number"), [("default", 10_000), ("by levels", 3_000), ("supra", 3_000)])
 def test_the_engine_has_the_law_of_the_reference_for_ten_thousand_particles(name: str, number: int) -> None:
     assert furthest(CASES[name], number, 2) < 1e-3
     assert furthest(CASES[name], number // 10, 3, 0.8) < 1e-3
@@ -66,7 +66,7 @@ def test_profiles_are_those_of_the_reference(name: str) -> None:
 
 
 @pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("name", ["default", "supra"])
+@pytest.mark.parametrize("name", ["default", "by levels", "supra"])
 def test_tables_of_predictions_are_those_of_the_reference(name: str, order: int) -> None:
     case, outcomes = CASES[name], 24
     drawn, rng = case.of_all_kinds(60, 4), np.random.default_rng(4)
@@ -99,9 +99,10 @@ def test_between_the_rows_of_a_table_everything_is_straight(name: str) -> None:
         np.testing.assert_allclose(found[0, i].T, expected, atol=1e-4)
 
 
+@pytest.mark.parametrize("name", ["default", "by levels"])
 @pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(0, 300, 5, reference="valve")], ids=["fine", "coarse"])
-def test_windows_expected_meps_and_baselines_are_those_of_the_reference(space: DesignSpace) -> None:
-    order, case = 12, CASES["default"]._replace(space=space)
+def test_windows_expected_meps_and_baselines_are_those_of_the_reference(space: DesignSpace, name: str) -> None:
+    order, case = 12, CASES[name]._replace(space=space)
     drawn = case.of_all_kinds(150, 6)
     sample, grid_ms = PersonSample(case.fields(drawn, order), space, order), np.array(space.grid_ms)
     masks, isi_ms = sample.window_masks(grid_ms.astype(np.float32))[0], FEW_MS[:-1]
@@ -195,9 +196,11 @@ def test_densities_of_the_priors_blocks_are_those_of_the_reference(name: str) ->
 @pytest.mark.parametrize(("first", "last", "names"), [("NOISE", "FIELDS", "field"), ("ISI", "COLUMNS", "column")])
 def test_fields_and_columns_have_the_order_of_the_c_header(first: str, last: str, names: str) -> None:
     header = (SOURCES / "people.h").read_text("utf-8")
-    (listed,) = re.findall(rf"enum \{{\n    ({first},.*?)\n    {last}\n", header, re.DOTALL)
-    in_c = re.findall(r"^\s*([A-Z_]+),", listed, re.MULTILINE)
+    (listed,) = re.findall(rf"enum \{{\n    ({first},.*?)\n    {last}\b", header, re.DOTALL)
+    in_c = re.findall(r"^\s*([A-Z_]+)(?: = \w+ \+ LEVELS)?,", listed, re.MULTILINE)
     if names == "field":
-        assert [getattr(records, name) for name in in_c] == list(range(FIELDS))
+        of_levels = range(records.LEVEL_AT, FIELDS, RESPONSE_LEVELS)
+        assert [getattr(records, name) for name in in_c] == [*range(records.LEVEL_AT), *of_levels]
+        assert f"LEVELS = {RESPONSE_LEVELS} " in header
     else:
         assert len(in_c) == COLUMNS == 5 + len(Circumstances._fields)

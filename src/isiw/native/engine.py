@@ -23,14 +23,14 @@ from isiw.types import BoolArray, FloatArray, Singles
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
 
-VERSION: Final = 8
+VERSION: Final = 9
 """Of the engine: it grows if the same draws come to other numbers."""
 
 _LONGEST: Final = 200
 """Of a library's statement of how it was made [bytes]."""
 
 
-FIELDS: Final = 27
+FIELDS: Final = 51
 """Of a particle; their names and order are those of `isiw.models.particles.records`."""
 
 COLUMNS: Final = 11
@@ -39,8 +39,11 @@ COLUMNS: Final = 11
 KINDS: Final = 5
 """Of a particle: its profile's shape, its noise, whether there is an enhancement, and a depression, and its change."""
 
-MEANINGS: Final = 32
-"""Latents that mean anything: those of the default in their order, then three of a depression."""
+RESPONSE_LEVELS: Final = 8
+"""Of a law by levels: at most so many intensities at which pulses were given alone."""
+
+MEANINGS: Final = 33
+"""Latents that mean anything: those of the default in their order, three of a depression, and the first of levels."""
 
 LANES: Final = 16
 """Latents that do not move are padded to whole vectors of any processor."""

@@ -14,7 +14,7 @@ from isiw.design import VALVE_SPACE
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.compiled import Crowd
 from isiw.models.particles.latents import Latents
-from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.noise import NoiseKind, recruits
 from isiw.models.particles.records import (
     BOOST,
     DRIFT,
@@ -184,7 +184,7 @@ def test_weighted_particles_are_represented_by_evenly_spaced_picks() -> None:
 
 def of_kind(kind: NoiseKind) -> tuple[Singles, History]:
     """Particles with a kind of noise and no change, and trials of theirs."""
-    case = CASES["default"]
+    case = CASES["by levels" if kind == NoiseKind.BY_LEVELS else "default"]
     latents = case.drawn(60, 7, people=2).with_kind("change", np.zeros((2, 60), dtype=np.int64))
     return case.fields(latents.with_kind("noise", np.full((2, 60), kind))), history(2, 20, 7)
 
@@ -211,14 +211,14 @@ def test_a_stronger_pulse_moves_up_a_recruitment_curve_and_is_nothing_to_others(
     higher = with_field(fields, REST, fields[..., REST] + 5.0 * fields[..., SLOPE])
     got = likelihood(fields, with_circumstances(told, shift_pct_rmt=5.0))
     np.testing.assert_allclose(got, likelihood(higher, told), atol=1e-3)
-    assert (got != likelihood(fields, told)).any() == (kind in {NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED})
+    assert (got != likelihood(fields, told)).any() == (bool(recruits(np.array(kind))))
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 def test_what_curves_alone_have_a_law_of_is_to_other_kinds_as_curves_predict_it(kind: NoiseKind) -> None:
     fields, told = of_kind(kind)
     got = likelihood(fields, with_circumstances(told, shift_pct_rmt=5.0, log_by_curves=-1.5))
-    curved = kind in {NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED}
+    curved = bool(recruits(np.array(kind)))
     expected = likelihood(fields, with_circumstances(told, shift_pct_rmt=5.0)) if curved else -1.5 * told.trials
     np.testing.assert_allclose(got, expected, rtol=1e-5)
 

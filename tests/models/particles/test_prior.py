@@ -175,9 +175,10 @@ def test_shares_sum_to_one(shares: type) -> None:
 
 def test_every_kind_has_its_share_in_the_order_of_the_kinds() -> None:
     header = (SOURCES / "people.h").read_text("utf-8").lower()
-    for shares in (ShapeShares, NoiseShares):
-        assert f"enum {{ {', '.join(f.name for f in fields(shares))} }}" in header
-    assert [f.name for f in fields(NoiseShares)] == [kind.name.lower() for kind in NoiseKind]
+    noise = [kind.name.lower() for kind in NoiseKind]
+    for names in ([f.name for f in fields(ShapeShares)], noise):
+        assert f"enum {{ {', '.join(names)} }}" in header
+    assert [*(f.name for f in fields(NoiseShares)), "by_levels"] == noise  # which only pulses given alone lead to
 
 
 def test_blocks_of_latents_are_named() -> None:

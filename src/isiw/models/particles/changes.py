@@ -176,8 +176,13 @@ class Change(NamedTuple):
         there = self.after <= trials - 1
         return (self.log_gain + self.log_scale) * there, self.shift_pct_rmt * there
 
-    def named(self, trials: int) -> EstimatedChange | None:
-        """What changed by the last of so many trials of equally weighted particles (1, p), as far as it matters."""
+    def named(self, trials: int, stood_for: int = 0) -> EstimatedChange | None:
+        """What changed by the last of so many trials of equally weighted particles (1, p), as far as it matters.
+
+        Args:
+            trials: how many trials there were.
+            stood_for: how many more trials the first of them stands for.
+        """
         gain, shift_pct = (step[0] for step in self.steps(trials))
         enhancement = (self.enhancement(trials) / self.enhancement(0))[0]
         levelled, shifted = np.abs(gain) > MATTERS, np.abs(shift_pct) > MATTERS * INTENSITY_PCT
@@ -187,7 +192,7 @@ class Change(NamedTuple):
             return None
         if share[1] > share[0]:
             return EstimatedChange("enhancement", share[1], *_interval(enhancement[faded]))
-        trial = int(np.quantile(np.ceil(self.after[0, stepped]), 0.5, method="lower"))
+        trial = stood_for + int(np.quantile(np.ceil(self.after[0, stepped]), 0.5, method="lower"))
         if shifted.sum() > levelled.sum():
             return EstimatedChange("intensity", share[0], *_interval(shift_pct[shifted]), trial)
         return EstimatedChange("amplitudes", share[0], *_interval(np.exp(gain[levelled])), trial)

@@ -32,11 +32,11 @@ _MOST_OF_BLOCK: Final = 32
 _MOST_BLOCKS: Final = 64
 """How many latents a block may have, and how many blocks a prior: `prior.h` has the same."""
 
-_OF_A_CHANGE: Final = slice(MEANINGS - 5, MEANINGS - 3)
-_OF_A_DEPRESSION: Final = slice(MEANINGS - 3, MEANINGS - 1)
+_OF_A_CHANGE: Final = slice(MEANINGS - 6, MEANINGS - 4)
+_OF_A_DEPRESSION: Final = slice(MEANINGS - 4, MEANINGS - 2)
 """Meanings of latents that moves write or compare: when and by how much, and the start and the log width."""
 
-_LAST_KINDS: Final = np.array([3, 4, 1, 1, 4])
+_LAST_KINDS: Final = np.array([3, 5, 1, 1, 4])
 """The last of each."""
 
 
@@ -192,7 +192,7 @@ class Law:
     def meanings(self, values: Singles, kinds: IntArray, trials: int) -> Singles:
         """Fields of particles after so many trials, or with their changes if it is negative, (b, p, fields)."""
         people, particles = self._require_particles(values, kinds)
-        found = np.empty((people, particles, FIELDS), dtype=SINGLE)
+        found = np.zeros((people, particles, FIELDS), dtype=SINGLE)
         arrays = self._values(values, kinds)
         call("meanings", self._at, people, particles, *arrays, trials, address(found, SINGLE, *found.shape))
         return found
@@ -270,7 +270,7 @@ class Law:
     def represent(self, crowd: Crowd, size: int, trials: int) -> tuple[IntArray, Singles]:
         """Equally weighted particles that stand for weighted ones: numbers (b, s), and fields after so many trials."""
         (people, particles), given = self._crowd(crowd, least=1)
-        picks, fields = np.empty((people, size), dtype=WHOLE), np.empty((people, size, FIELDS), dtype=SINGLE)
+        picks, fields = np.empty((people, size), dtype=WHOLE), np.zeros((people, size, FIELDS), dtype=SINGLE)
         arrays = *given[:3], address(picks, WHOLE, people, size), address(fields, SINGLE, *fields.shape)
         call("represent", self._at, people, particles, size, trials, *arrays)
         return picks, fields
@@ -299,7 +299,7 @@ class Law:
             seeds: of each person, (b,) whole numbers of 64 bits without a sign.
         """
         people = len(seeds)
-        values = np.empty((people, particles, self.latents), dtype=SINGLE)
+        values = np.zeros((people, particles, self.latents), dtype=SINGLE)
         kinds = np.empty((people, particles, KINDS), dtype=WHOLE)
         arrays = self._values(values, kinds)
         call("draws", self._at, people, particles, address(seeds, NATURAL, people), *arrays)

@@ -24,6 +24,7 @@ from isiw.models.particles.latents import (
     latents_of,
     used_by,
 )
+from isiw.models.particles.levels import CARRIED
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Prior
 
@@ -63,19 +64,24 @@ _RENEWED: Final = {
 """Which kinds each jump draws again."""
 
 
+_NO_DEPRESSION: Final = (-1,) * 3
+
+
 @lru_cache(maxsize=64)
-def law_of(prior: Prior, space: DesignSpace) -> Law:
-    """The prior, and what moves may do, as the engine has them."""
+def law_of(prior: Prior, space: DesignSpace, *, by_levels: bool = False) -> Law:
+    """The prior, and what moves may do, as the engine has them; particles may have a law by levels, too."""
     profile = prior.profile
     joint = profile.joint(space)
     change, present, noise = np.indices((len(ChangeKind), 2, len(NoiseKind))).reshape(3, -1)
     used = used_by(noise, present > 0, change)
+    carried = CARRIED if by_levels else 0  # behind the latents, and neither drawn nor moved
+    behind = [(0, 0), (0, carried)]
     moves = {
         "apart": False,
         "state_of": np.array([0, 1, len(NoiseKind), 0, 2 * len(NoiseKind)]),
-        "shifted": _SHIFTED & used[:, np.newaxis],
+        "shifted": np.pad(_SHIFTED & used[:, np.newaxis], [(0, 0), *behind]),
         "jumps": tuple(JUMPS.values()),
-        "redrawn": np.stack([latents_of(*REDRAWN[jump]) for jump in JUMPS]),
+        "redrawn": np.pad(np.stack([latents_of(*REDRAWN[jump]) for jump in JUMPS]), behind),
         "renewed": np.array([[kind in kinds for kind in KINDS] for kinds in _RENEWED.values()]),
         "of_profile": np.array([jump in {"form", "place"} for jump in JUMPS]),
         "kinds": (
@@ -92,8 +98,8 @@ def law_of(prior: Prior, space: DesignSpace) -> Law:
         list(prior.mixtures.values()),
         starts=1,
         places=None if joint is None else (joint.share, joint.mixture),
-        at=range(len(LATENTS)),
-        spreads=prior.spreads,
+        at=[*range(len(LATENTS)), *_NO_DEPRESSION, len(LATENTS) if by_levels else -1],
+        spreads=np.append(prior.spreads, np.ones(carried)),
         moves=moves,
     )
     return Law(tables)

@@ -63,7 +63,12 @@ def used_by(noise: IntArray, present: BoolArray, change: IntArray | None = None)
 
 
 _OF_PROFILE: Final = latents_of(*PROFILE_BLOCKS)
-_USED_BY_KIND: Final = np.stack([latents_of(*_COMMON, *_USED[kind]) for kind in NoiseKind])
+_USED_BY_KIND: Final = np.stack(
+    [
+        *(latents_of(*_COMMON, *names) for names in _USED.values()),
+        latents_of("session") | np.array([name == "log_boost" for name in LATENTS]),  # by levels
+    ]
+)
 _BY_CHANGE: Final = {ChangeKind.NONE: (), ChangeKind.ENHANCEMENT: ("change",)}
 _USED_BY_CHANGE: Final = np.stack([latents_of(*_BY_CHANGE.get(kind, ("changed", "change"))) for kind in ChangeKind])
 

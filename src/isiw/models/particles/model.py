@@ -26,6 +26,7 @@ from isiw.models.particles.prior import Prior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import AtIntensity, Observation, PriorPerson
 from isiw.models.shared.draws import NOTED, SIMULATED, seeds, stream
+from isiw.models.shared.history import ORDER
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, grid_of, profile_grid, sampled_estimate
 from isiw.types import Array, ArrayLike, FloatArray, Singles
 from isiw.window import Window
@@ -113,17 +114,43 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         """
         given = self.swarm.before_pairs and bool(np.isnan(observation.isi_ms).all())
         doubted = given and observation.shift_pct_rmt is not None
-        own = replace(self, swarm=self.swarm.doubting(self.model.prior.other_curve)) if doubted else self
+        own = replace(self, swarm=self.swarm.doubting(self.model.prior.other_curve)) if doubted else self._by_levels()
         learnt = super(ParticlePosterior, own).after(observation)
         if learnt.swarm.halves == 1 or given:
             return learnt
-        people = range(0, len(learnt.swarm.history.columns), learnt.swarm.halves)
-        against = np.array([against_level(learnt.swarm.history, row) or 0.0 for row in people])
+        told, people = learnt.swarm.whole_history, range(0, len(learnt.swarm.history.columns), learnt.swarm.halves)
+        against = np.array([against_level(told, row) or 0.0 for row in people])
         return replace(learnt, swarm=learnt.swarm.unheeding(against >= AGAINST_A_CURVE))
+
+    def _by_levels(self) -> ParticlePosterior:
+        """The same with the law of pulses given alone by levels in place of these, where this is the first other trial.
+
+        A change that was noted since then comes before all that is learnt again.
+        """
+        if not self.swarm.ends_with_given:
+            return self
+        before = self.model.prior
+        model = replace(self.model, prior=replace(before, changes=replace(before.changes, noted=())))
+        law, usual = self._laws(model, by_levels=True)
+        swarm = self.swarm.by_levels(self.law, law, self.seed, before.other_curve)
+        if swarm is None:
+            return self
+        begun = replace(self, model=model, swarm=swarm, law=law, usual=usual)
+        begun = begun.noting_change() if before.changes.noted else begun
+        for trial in self.swarm.others:
+            trial.columns[:, 0, ORDER] = begun.swarm.trials
+            begun = replace(begun, swarm=begun.swarm.after(trial, begun.law, model.moves, self.seed))
+        return begun
+
+    def _laws(self, model: ParticleModel, *, by_levels: bool) -> tuple[Law, Law]:
+        """A model's prior, and the one that ISIs are chosen with."""
+        priors = model.prior, model.prior_where_asking
+        law, usual = (law_of(prior, self.space, by_levels=by_levels) for prior in priors)
+        return law, usual
 
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""
-        trials, before, latents = self.trials, self.model.prior.changes, self.swarm.latents
+        trials, before, latents = self.swarm.trials, self.model.prior.changes, self.swarm.latents
         if not trials or trials in before.noted:  # several notes at one trial are one change
             return self
         changes = before.noting(trials)
@@ -134,10 +161,10 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         untouched = self.model.prior.untouched(latents, trials)
         share, left = changes.noted_share / before.untouched(trials), 1.0 - changes.noted_share
         chosen = untouched & (rng.random(kind.shape) < share / (share + left))
-        values, own = latents.values.copy(), latents_of("changed", "change")
+        values, own = self.swarm.crowd.values.copy(), np.flatnonzero(latents_of("changed", "change"))
         values[..., own] = np.where(chosen[..., np.newaxis], noted, values[..., own])
         kinds = latents.with_kind("change", np.where(chosen, kind, latents.change)).kinds
-        law, usual = law_of(model.prior, self.space), law_of(model.prior_where_asking, self.space)
+        law, usual = self._laws(model, by_levels=self.swarm.carried > 0)
         log_weights = self.swarm.log_weights + np.where(untouched, math.log(share + left), math.log(left))
         log_weights -= log_sum(log_weights)[:, np.newaxis]
         nothing, log_likelihood = law.nothing_known(*kind.shape), self.swarm.crowd.log_likelihood
@@ -148,13 +175,13 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
     def sample(self) -> PersonSample:
         """The particles that represent all of them where every candidate ISI is scored."""
         _, fields = self.swarm.picked(self.law, self.model.thinned)
-        return PersonSample(fields, self.space, self.trials, self.stronger_pct_rmt)
+        return PersonSample(fields, self.space, self.swarm.trials, self.stronger_pct_rmt)
 
     def reductions(self, isi_ms: Array, *, of_window: bool) -> Singles:
         """How much the next MEP is expected to tell; see `ForeseesReductions`."""
         usual = None if self.swarm.chosen_by is None else self.usual
         how = Asking(of_window, usual, self.stronger_pct_rmt)
-        return self.law.ask(self.swarm.crowd, singles(isi_ms), self.model.thinned, self.trials, how)
+        return self.law.ask(self.swarm.crowd, singles(isi_ms), self.model.thinned, self.swarm.trials, how)
 
     def at_intensity(self, shift_pct_rmt: float) -> AtIntensity:
         """What recruitment curves expect of a stronger pulse, of which other noise says nothing (decision 45)."""
@@ -176,12 +203,12 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         """The window of one person."""
         prior, swarm = self.model.prior, self.swarm
         crowd = swarm.weighed.of_person(person)
-        picks, windows = self.law.estimate(crowd, self.model.particles, self.trials)
-        latents = Latents(crowd.values, crowd.kinds).taken(picks)
+        picks, windows = self.law.estimate(crowd, self.model.particles, swarm.trials)
+        latents = swarm.named(crowd).taken(picks)
 
         def profiles() -> SampledProfiles:
             few = swarm.picked(self.law, self.model.thinned, person)[1]
-            sample = PersonSample(few, self.space, self.trials)
+            sample = PersonSample(few, self.space, swarm.trials)
             return SampledProfiles(sample.expected_mep_mv(profile_grid(self.space))[0], sample.baselines_mv()[0])
 
         estimate = sampled_estimate(
@@ -193,9 +220,11 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         )
         return estimate.noting(
             unusual=Later(lambda: prior.unusual(latents, self.space)),
-            change=Later(lambda: prior.change(latents).named(self.trials)),
-            time_alone=Later(lambda: float((prior.of_time(latents, self.trials) & ~latents.present).mean())),
-            misfit=Later(lambda: Misfit(swarm.bets.worth(person), against_level(swarm.history, person * swarm.halves))),
+            change=Later(lambda: prior.change(latents).named(swarm.trials, swarm.stood_for)),
+            time_alone=Later(lambda: float((prior.of_time(latents, swarm.trials) & ~latents.present).mean())),
+            misfit=Later(
+                lambda: Misfit(swarm.bets.worth(person), against_level(swarm.whole_history, person * swarm.halves))
+            ),
         )
 
 

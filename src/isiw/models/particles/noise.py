@@ -19,9 +19,10 @@ class NoiseKind(IntEnum):
     RECRUITMENT = 2
     ALL_OR_NONE = 3
     RECTIFIED = 4
+    BY_LEVELS = 5
 
 
 def recruits(kind: IntArray) -> BoolArray:
-    """Which particles have a recruitment curve, with a threshold or without, same shape."""
-    found: BoolArray = (kind == NoiseKind.RECRUITMENT) | (kind == NoiseKind.RECTIFIED)
+    """Which particles know what pulses of another intensity evoke, by a recruitment curve or by levels, same shape."""
+    found: BoolArray = (kind == NoiseKind.RECRUITMENT) | (kind >= NoiseKind.RECTIFIED)
     return found

@@ -58,12 +58,12 @@ class SwarmPosterior(ABC, Generic[M]):
     @property
     def trials(self) -> int:
         """Number of trials of each person that it has learnt."""
-        return self.swarm.trials
+        return self.swarm.trials + self.swarm.stood_for
 
     @cached_property
     def pairs(self) -> int:
         """Number of them that were pairs of stimuli; see `CountsPairs`."""
-        return self.trials - int(np.isnan(self.swarm.history.isi_ms[0]).sum())
+        return int((~np.isnan(self.swarm.history.isi_ms[0])).sum())
 
     @property
     def trouble(self) -> str | None:
@@ -81,7 +81,7 @@ class SwarmPosterior(ABC, Generic[M]):
 
     def _trial(self, observation: Observation) -> History:
         known = self.model.detection_limit_mv, self.model.response_threshold_mv
-        return observed(observation, *known, order=self.trials)
+        return observed(observation, *known, order=self.swarm.trials)
 
     def outcome_mass(self, isi_ms: Array) -> Singles:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""

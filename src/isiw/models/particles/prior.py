@@ -208,7 +208,8 @@ class Prior(Checked):
 
     def hypothesis(self, latents: Latents) -> IntArray:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
-        curved = latents.noise == NoiseKind.RECRUITMENT
+        # A law by levels was made of a curve that the same pulses taught, and is of its muscle.
+        curved = (latents.noise == NoiseKind.RECRUITMENT) | (latents.noise == NoiseKind.BY_LEVELS)
         found: IntArray = self._hypothesis_numbers[latents.noise, 0]
         curve = self.mixtures["recruitment"].component(latents.values[curved][:, _OF_CURVE])
         found[curved] = self._hypothesis_numbers[NoiseKind.RECRUITMENT, curve]

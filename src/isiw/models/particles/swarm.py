@@ -15,11 +15,12 @@ import numpy as np
 
 from isiw.checks import Checked, Natural, Share
 from isiw.models.particles.compiled import Crowd, Law
-from isiw.models.particles.latents import Latents
+from isiw.models.particles.latents import Latents, latents_of
+from isiw.models.particles.levels import CARRIED, along_curves, drawn, levels_of
 from isiw.models.particles.misfit import Bets
 from isiw.models.particles.mixture import log_sum
-from isiw.models.particles.noise import recruits
-from isiw.models.shared.draws import seeds
+from isiw.models.particles.noise import NoiseKind, recruits
+from isiw.models.shared.draws import OTHER_HALF, TAUGHT, seeds, stream, systematic
 from isiw.models.shared.history import BY_CURVES, COUNTS, SHIFT, History
 from isiw.native.engine import Seeds, log_likelihoods
 from isiw.types import BoolArray, FloatArray, Singles
@@ -105,6 +106,8 @@ class Swarm:
     health: Health | None = None  # after the last trial; None before the first
     chosen_by: tuple[Law, Law] | None = None  # their law, and the one that weighs them instead where ISIs are chosen
     halves: int = 1  # 2 where the second half of the particles does not learn from pulses given alone
+    carried: int = 0  # numbers behind the latents: `CARRIED` where some particles have a law by levels
+    given: History | None = None  # pulses given alone that such a law stands for
 
     @classmethod
     def of(cls, law: Law, people: int, particles: int, seed: int) -> Swarm:
@@ -118,7 +121,11 @@ class Swarm:
     @property
     def latents(self) -> Latents:
         """The particles, fields of shape (b, p)."""
-        return Latents(self.crowd.values, self.crowd.kinds)
+        return self.named(self.crowd)
+
+    def named(self, crowd: Crowd) -> Latents:
+        """The latents of particles, without what they carry along."""
+        return Latents(crowd.values[..., : crowd.values.shape[-1] - self.carried], crowd.kinds)
 
     @cached_property
     def log_weights(self) -> FloatArray:
@@ -139,8 +146,13 @@ class Swarm:
 
     @property
     def trials(self) -> int:
-        """Number of trials of each person that it has learnt."""
-        return self.history.trials
+        """Number of trials of each person that it has learnt; those that a law by levels stands for are one."""
+        return self.history.trials + (self.given is not None)
+
+    @property
+    def stood_for(self) -> int:
+        """How many more trials were learnt."""
+        return 0 if self.given is None else self.given.trials - 1
 
     @cached_property
     def trouble(self) -> str | None:
@@ -160,6 +172,64 @@ class Swarm:
         crowd = Crowd._make(doubled)
         crowd = crowd._replace(log_weights=crowd.log_weights + parts)
         return replace(self, crowd=crowd, history=History(self.history.columns.repeat(2, axis=0)), halves=2)
+
+    def by_levels(self, learnt_law: Law, law: Law, seed: int, share: float) -> Swarm | None:
+        """Particles that begin again with what pulses given alone have taught, in place of these pulses.
+
+        Half of them have a law by levels, every second one of these by those of the pulses, the others by those along
+        the curves that the pulses have taught; the other half is what it is with nothing given (decision 60).
+
+        Args:
+            learnt_law: what particles mean so far.
+            law: the prior of particles that may have a law by levels.
+            seed: of the draws.
+            share: probability that the pairs are of another curve.
+
+        Returns:
+            None where the pulses of any of the people make no law by levels.
+        """
+        rows, people = self._rows, len(self.evidence)
+        levels = [levels_of(self.history, self.halves * person) for person in range(people)]
+        curved = np.where(recruits(rows.kinds[..., 1]), rows.log_weights, -np.inf)
+        if not all(levels) or np.isneginf(curved[:: self.halves].max(1)).any():
+            return None
+        half = curved.shape[1]
+        begun = Swarm.of(law, people, half, seed).doubting(share)
+        crowd, curve = begun.crowd.copied(), np.flatnonzero(latents_of("recruitment"))
+        for person, own in enumerate(levels):
+            rng, row = stream(seed + person, TAUGHT), self.halves * person
+            picks = rng.permutation(systematic(curved[row : row + 1], half)[0])
+            taught = rows.values[row : row + 1, picks], rows.kinds[row : row + 1, picks]
+            values, kinds = crowd.values[person, :half], crowd.kinds[person, :half]
+            values[:, curve] = taught[0][0][:, curve]
+            values[:, -CARRIED:] = along_curves(learnt_law.meanings(*taught, -1)[0])
+            values[::2, -CARRIED:] = drawn(own, len(values[::2]), rng)
+            kinds[:, 1] = NoiseKind.BY_LEVELS
+        given = History(self.history.columns[:, self._are_given])
+        return replace(begun, crowd=crowd, evidence=self.evidence, bets=self.bets, carried=CARRIED, given=given)
+
+    @property
+    def _are_given(self) -> BoolArray:
+        """Which trials were pulses alone that were given first, (n,)."""
+        given: BoolArray = self.history.columns[0, :, COUNTS] < 1.0
+        return given
+
+    @property
+    def others(self) -> list[History]:
+        """The trials that were not, each as one of each person."""
+        columns = self.history.columns[:: self.halves, ~self._are_given]
+        return [History(columns[:, at : at + 1]) for at in range(columns.shape[1])]
+
+    @property
+    def ends_with_given(self) -> bool:
+        """Whether the last trial was a pulse alone that was given first."""
+        return bool(self._are_given[-1:].any())
+
+    @property
+    def whole_history(self) -> History:
+        """The trials, with those first that a law by levels stands for."""
+        own = self.history
+        return own if self.given is None else History(np.concatenate((self.given.columns, own.columns), axis=1))
 
     def unheeding(self, who: BoolArray) -> Swarm:
         """The same where hardly a particle learns from pulses given alone, of some people (b,)."""
@@ -195,7 +265,9 @@ class Swarm:
         crowd, trials = self._rows, self.trials + 1
         told = self._as_curves_have_it(trial, law, crowd)
         sweeps = tuple(moves.sweeps_after(trials, resampled=worn) for worn in (False, True))
-        learnt, found = self._learnt(told, law, crowd, (moves.min_ess, sweeps, seeds(seed, trials, len(crowd.kinds))))
+        step, people = trials + self.stood_for, len(self.evidence)
+        dice = [seeds(seed, step + OTHER_HALF * half, people) for half in range(self.halves)]
+        learnt, found = self._learnt(told, law, crowd, (moves.min_ess, sweeps, np.stack(dice, axis=1).ravel()))
         with np.errstate(invalid="ignore"):  # where there were no moves, no share of them was accepted
             health = Health(found[:, 1], found[:, 3] / found[:, 2], found[:, 5] / found[:, 4])
         return replace(learnt, bets=self._bets_after(told, found[:, 6:]), health=health)
@@ -278,4 +350,4 @@ class Swarm:
         """
         crowd = self.weighed if person is None else self.weighed.of_person(person)
         picks, fields = law.represent(crowd, size, self.trials)
-        return Latents(crowd.values, crowd.kinds).taken(picks), fields
+        return self.named(crowd).taken(picks), fields

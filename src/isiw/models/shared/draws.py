@@ -18,8 +18,10 @@ OUTCOMES: Final = 24
 
 SIMULATED: Final = 2**31
 NOTED: Final = 2**30
-"""The step whose stream simulated people are drawn from, and that of the first change that is noted: no posterior gets
-there."""
+TAUGHT: Final = 2**29
+OTHER_HALF: Final = 2**28
+"""The steps whose streams simulated people are drawn from, the first change that is noted, what pulses given alone have
+taught, and the first of particles that do not learn from these: no posterior gets there."""
 
 
 def stream(seed: int, step: int) -> np.random.Generator:

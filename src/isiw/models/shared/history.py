@@ -31,6 +31,7 @@ class Circumstances(NamedTuple):
 _OF_A_TRIAL: Final = 5
 """Columns of a trial before its circumstances."""
 
+ORDER: Final = _OF_A_TRIAL - 1
 SHIFT, BY_CURVES, COUNTS = (
     _OF_A_TRIAL + Circumstances._fields.index(name) for name in ("shift_pct_rmt", "log_by_curves", "counts")
 )
@@ -80,7 +81,7 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
     """One trial of each person as a history."""
     limits = math.log(detection_limit_mv), math.log(response_threshold_mv)
     columns = np.empty((len(observation.isi_ms), 1, _OF_A_TRIAL + len(Circumstances._fields)), dtype=np.float32)
-    columns[:, 0, _OF_A_TRIAL - 1], columns[:, 0, _OF_A_TRIAL:] = order, Circumstances()
+    columns[:, 0, ORDER], columns[:, 0, _OF_A_TRIAL:] = order, Circumstances()
     columns[:, 0, 0], columns[:, 0, 1] = observation.isi_ms, observation.isi_sd_ms
     high_mv = [math.nan] * len(columns) if observation.mep_high_mv is None else observation.mep_high_mv.tolist()
     people = zip(observation.mep_mv.tolist(), high_mv, observation.response.tolist(), strict=True)
@@ -107,7 +108,7 @@ def _ends(mep_mv: float, high_mv: float, response: float, limit: float, threshol
 def neutral(trials: int) -> Singles:
     """Columns of so many trials that nothing but their order is known of, shape (n, 11)."""
     columns = np.zeros((trials, _OF_A_TRIAL + len(Circumstances._fields)), dtype=np.float32)
-    columns[:, _OF_A_TRIAL - 1], columns[:, _OF_A_TRIAL:] = np.arange(trials), Circumstances()
+    columns[:, ORDER], columns[:, _OF_A_TRIAL:] = np.arange(trials), Circumstances()
     return columns
 
 

@@ -21,7 +21,7 @@ static int windows_of(const Tables *tables, int64_t samples, const float *fields
 static void foresee(Sums *sums, const Tables *tables, const float *fields, int64_t order, const float *levels,
                     const float *cells, const float *isi_ms, const int32_t *runs, float *room) {
     int64_t rows = tables->rows, outcomes = tables->outcomes, isis = sums->isis, from = isis, to = 0;
-    float *table = room + 2 * NODES * rows, *rest = table + rows * outcomes, *at = rest + outcomes;
+    float *table = room + 3 * NODES * rows, *rest = table + rows * outcomes, *at = rest + outcomes;
     float *window = at + isis, *mass = window + isis, depth = fields[DEPTH];
     uint8_t *needed = (uint8_t *)(mass + isis * outcomes);
     facilitations_at(fields, isi_ms, isis, at);
@@ -46,7 +46,7 @@ static int ask(const Tables *tables, const Tables *usual, int64_t people, int64_
                float *found) {
     if (!known_kinds(tables, people * particles, kinds)) return NO_PARTICLES;
     int64_t rows = tables->rows, outcomes = tables->outcomes, of_all = size * (FIELDS + 2 * rows + 1);
-    int64_t of_one = 2 * NODES * rows + (rows + 1 + isis) * outcomes + 2 * isis + rows; /* with flags as numbers */
+    int64_t of_one = 3 * NODES * rows + (rows + 1 + isis) * outcomes + 2 * isis + rows; /* with flags as numbers */
     float *fields = malloc((size_t)(of_all + 2 * outcomes + of_one) * sizeof *fields);
     double *weights = malloc((size_t)particles * sizeof *weights);
     int64_t *picks = malloc((size_t)size * sizeof *picks);

@@ -213,7 +213,7 @@ static int represent(const Tables *tables, int64_t people, int64_t particles, in
         meanings_of(tables, values + first * tables->latents, tables->latents, kinds + first * KINDS, own, size, room);
         for (int64_t i = 0; i < size; i++) {
             float *meant = fields + (person * size + i) * FIELDS;
-            memcpy(meant, room + own[i] * FIELDS, FIELDS * sizeof *meant);
+            memcpy(meant, room + own[i] * FIELDS, (size_t)fields_of(tables) * sizeof *meant);
             settle(meant, (float)trials);
         }
     }

@@ -14,7 +14,7 @@ facilitation as the drive and log-gamma noise. See docs/model.md. */
 
 #include "profile.h"
 
-enum { NODES = 8, FACTOR_NODES = 5, GROUPS = 64 };
+enum { NODES = LEVELS, FACTOR_NODES = 5, GROUPS = 64 };
 
 #define NODE_REACH 2.6
 #define BETWEEN_NODES (0.4 * 2.0 * NODE_REACH / (NODES - 1)) /* SD of what lies between the nodes */
@@ -61,11 +61,34 @@ INLINE Reals odds_against(Reals drive, float lowest) {
 /* The same without a recruitment curve, whose drive is the log of the facilitation. */
 INLINE Reals odds_of_level(Reals level) { return per_v(most_v(level, all(1e-9f))); }
 
-/* A curve as its nodes have it. */
+/* A curve as its nodes have it, or a law by levels, of which one is in the place of each node. */
 typedef struct {
-    Reals odds[NODES];    /* of the noise on the input, see odds_against */
-    Reals between[NODES]; /* variance of what lies between, where the sigmoid is steepest */
+    Reals odds[NODES];    /* of the noise on the input, see odds_against; of a level what it evokes, in floors */
+    Reals between[NODES]; /* variance of what lies between, where the sigmoid is steepest; of a level that of log MEPs */
 } Curve;
+
+/* The share of each level in the law at an intensity between them: the nearer of two the more (docs/model.md). */
+INLINE void shares_of_levels(const Reals *fields, Reals stronger, Reals *share) {
+    Reals beyond = all(1.0f);
+    for (int level = 0; level < LEVELS; level++) {
+        Reals next = all(0.0f), from = fields[LEVEL_AT + level];
+        if (level + 1 < LEVELS) {
+            Reals way = (stronger - from) / (fields[LEVEL_AT + level + 1] - from);
+            next = least_v(most_v(way, all(0.0f)), all(1.0f));
+        }
+        share[level] = beyond - next, beyond = next;
+    }
+}
+
+static Curve levels_of(const Particles *particles) {
+    const Reals *of = particles->of;
+    Curve made;
+    for (int level = 0; level < LEVELS; level++) {
+        made.odds[level] = exp_v(of[LEVEL_MEAN + level] - of[LOG_FLOOR]) - 1.0f;
+        made.between[level] = of[LEVEL_SD + level] * of[LEVEL_SD + level];
+    }
+    return made;
+}
 
 /* Noise of a recruitment curve is normal on the input; of the other kinds it is log-gamma, by Wilson and Hilferty's
 root (PNAS 17, 1931), with its mean at 1. */
@@ -95,7 +118,11 @@ static Curve curve_of(const Particles *particles, int curved) {
 /* What one trial is to the particles. */
 typedef struct {
     Reals odds, scale, responds, known, floor_variance, output, start;
+    Reals share[NODES]; /* of the levels */
 } Situation;
+
+/* How particles respond: along a curve, along one with a threshold, or by levels. */
+enum { ALONG, FROM_A_THRESHOLD, LEVEL_BY_LEVEL };
 
 /* Nodes are computed four at a time, each step for all four: the next step of one waits for its outcome, which takes
 longer than the steps of the others. */
@@ -103,11 +130,19 @@ enum { TOGETHER_NODES = 4 };
 #define EACH_NODE _Pragma("GCC unroll 4") for (int q = 0; q < TOGETHER_NODES; q++)
 
 /* Means and inverse SDs of the log MEP over the floor at four nodes: the variance is that of each part by its share. */
-INLINE void components(const Situation *trial, const Reals *odds, const Reals *between, int rectified, Reals *mean,
+INLINE void components(const Situation *trial, const Reals *odds, const Reals *between, int how, Reals *mean,
                        Reals *inverse_sd) {
     Reals share[TOGETHER_NODES], variance[TOGETHER_NODES], sum[TOGETHER_NODES];
+    if (how == LEVEL_BY_LEVEL) {
+        EACH_NODE {
+            sum[q] = 1.0f + odds[q] * trial->scale + trial->known;
+            inverse_sd[q] = per_root_v(between[q] + trial->floor_variance * per_v(sum[q] * sum[q]));
+        }
+        EACH_NODE mean[q] = log_v(sum[q]);
+        return;
+    }
     EACH_NODE share[q] = per_v(1.0f + trial->odds * odds[q]);
-    if (rectified) { /* what lies between the nodes rounds the corner of the curve at its threshold */
+    if (how == FROM_A_THRESHOLD) { /* what lies between the nodes rounds the corner of the curve at its threshold */
         Reals rescaled = trial->scale * 0.5f * per_v(1.0f - trial->start), reach[TOGETHER_NODES];
         EACH_NODE {
             Reals steep = share[q] * (1.0f - share[q]);
@@ -130,14 +165,18 @@ INLINE void components(const Situation *trial, const Reals *odds, const Reals *b
     EACH_NODE mean[q] = log_v(sum[q]);
 }
 
+INLINE Reals weight_of(const Situation *trial, int how, int node) {
+    return how == LEVEL_BY_LEVEL ? trial->share[node] : all(node_weight[node]);
+}
+
 /* Density of a log MEP over the floor. */
-INLINE Reals density(const Situation *trial, const Curve *curve, int rectified, Reals log_mep) {
+INLINE Reals density(const Situation *trial, const Curve *curve, int how, Reals log_mep) {
     Reals evoked = all(0.0f);
     for (int first = 0; first < NODES; first += TOGETHER_NODES) {
         Reals mean[TOGETHER_NODES], inverse_sd[TOGETHER_NODES], bell[TOGETHER_NODES];
-        components(trial, curve->odds + first, curve->between + first, rectified, mean, inverse_sd);
+        components(trial, curve->odds + first, curve->between + first, how, mean, inverse_sd);
         EACH_NODE bell[q] = bell_v((mean[q] - log_mep) * inverse_sd[q]);
-        EACH_NODE evoked += node_weight[first + q] * inverse_sd[q] * bell[q];
+        EACH_NODE evoked += weight_of(trial, how, first + q) * inverse_sd[q] * bell[q];
     }
     Reals still = (1.0f + trial->known) * per_root_v(trial->floor_variance);
     Reals silent = still * bell_v((log_v(1.0f + trial->known) - log_mep) * still);
@@ -155,14 +194,14 @@ INLINE Reals normal_between(Reals low, Reals high) {
 }
 
 /* Probability that a log MEP over the floor lies between two ends. */
-INLINE Reals mass_between(const Situation *trial, const Curve *curve, int rectified, Reals low, Reals high) {
+INLINE Reals mass_between(const Situation *trial, const Curve *curve, int how, Reals low, Reals high) {
     Reals evoked = all(0.0f);
     for (int first = 0; first < NODES; first += TOGETHER_NODES) {
         Reals mean[TOGETHER_NODES], inverse_sd[TOGETHER_NODES];
-        components(trial, curve->odds + first, curve->between + first, rectified, mean, inverse_sd);
+        components(trial, curve->odds + first, curve->between + first, how, mean, inverse_sd);
         EACH_NODE {
             Reals inside = normal_between((low - mean[q]) * inverse_sd[q], (high - mean[q]) * inverse_sd[q]);
-            evoked += node_weight[first + q] * inside;
+            evoked += weight_of(trial, how, first + q) * inside;
         }
     }
     Reals still = (1.0f + trial->known) * per_root_v(trial->floor_variance), mean = log_v(1.0f + trial->known);
@@ -179,15 +218,15 @@ typedef struct {
     Profiles profiles;
     Curve curve;
     Wholes switches, missing;
-    int curved, rectified, any_step, any_fading, any_scale, any_missing, any_switch;
+    int curved, how, any_step, any_fading, any_scale, any_missing, any_switch;
     Reals per_floor, per_scale, floor_variance, output, log_ratio, fading;
 } Group;
 
-static Group group_of(const Particles *particles, int curved, int rectified) {
+static Group group_of(const Particles *particles, int curved, int how) {
     const Reals *of = particles->of;
-    Group made = {.particles = particles, .curved = curved, .rectified = rectified};
+    Group made = {.particles = particles, .curved = curved, .how = how};
     made.profiles = profiles_of(particles);
-    made.curve = curve_of(particles, curved);
+    made.curve = how == LEVEL_BY_LEVEL ? levels_of(particles) : curve_of(particles, curved);
     made.switches = of[NOISE] == (float)ALL_OR_NONE, made.missing = of[NOISE] == (float)MISSING;
     made.any_switch = any(made.switches), made.any_missing = any(made.missing);
     made.any_step = any((of[STEP] != 0.0f) | (of[STEP_DRIVE] != 0.0f)), made.any_scale = any(of[STEP_SCALE] != 0.0f);
@@ -228,6 +267,10 @@ INLINE void driven_at(const Group *group, const Trial *trial, float isi_ms, Whol
     if (group->curved) {
         Reals drive = of[REST] + of[BOOST] * level + of[SLOPE] * trial->of[SHIFT];
         if (group->any_step) drive += pick(changed, of[STEP_DRIVE], all(0.0f));
+        if (group->how == LEVEL_BY_LEVEL) {
+            shares_of_levels(of, drive, made->share);
+            return;
+        }
         made->odds = odds_against(drive, LOWEST_DRIVE);
         return;
     }
@@ -242,7 +285,7 @@ INLINE void driven_at(const Group *group, const Trial *trial, float isi_ms, Whol
 
 /* Log likelihood of one trial under each particle. The ISI, where it is known with an SD only, is integrated out
 (Gauss and Hermite, three nodes). */
-INLINE Reals of_trial(const Group *group, const Trial *trial, float factor_at, int rectified) {
+INLINE Reals of_trial(const Group *group, const Trial *trial, float factor_at, int how) {
     if (trial->of_curves && !group->curved) return all(trial->of[BY_CURVES]);
     static const float shift[3] = {0.0f, -1.7320508f, 1.7320508f}, share[3] = {2.0f / 3.0f, 1.0f / 6.0f, 1.0f / 6.0f};
     const Reals *of = group->particles->of;
@@ -255,8 +298,8 @@ INLINE Reals of_trial(const Group *group, const Trial *trial, float factor_at, i
     Reals high = least_1(trial->of[HIGH], EVER) - floor;
     for (int node = 0; node < (uncertain ? 3 : 1); node++) {
         driven_at(group, trial, trial->of[ISI] + shift[node] * trial->of[ISI_SD], changed, &made);
-        Reals found = interval ? mass_between(&made, &group->curve, rectified, low, high)
-                               : density(&made, &group->curve, rectified, low);
+        Reals found = interval ? mass_between(&made, &group->curve, how, low, high)
+                               : density(&made, &group->curve, how, low);
         likelihood = uncertain ? likelihood + share[node] * found : found;
     }
     return trial->of[COUNTS] * log_v(likelihood);
@@ -276,7 +319,7 @@ static void sharing_likelihood(const Group *group, const Trial *trials, int64_t 
     for (int node = 0; node < FACTOR_NODES; node++)
         for (int64_t i = 0; i < count; i++)
             sums[node][group_of_isi(trials[i].of[ISI])] +=
-                of_trial(group, trials + i, factor_at[node], group->rectified);
+                of_trial(group, trials + i, factor_at[node], group->how);
     for (int lane = 0; lane < LANES; lane++) found[lane] = 0.0;
     for (int at = 0; at < GROUPS; at++)
         for (int lane = 0; lane < LANES; lane++) {
@@ -296,33 +339,39 @@ static void sharing_likelihood(const Group *group, const Trial *trials, int64_t 
 /* Sums in single precision are not longer than this. */
 enum { STRETCH = 32 };
 
-INLINE void summed_likelihood(const Group *group, const Trial *trials, int64_t count, int rectified, double *found) {
+INLINE void summed_likelihood(const Group *group, const Trial *trials, int64_t count, int how, double *found) {
     for (int lane = 0; lane < LANES; lane++) found[lane] = 0.0;
     for (int64_t first = 0; first < count; first += STRETCH) {
         Reals sum = all(0.0f);
         for (int64_t i = first; i < count && i < first + STRETCH; i++)
-            sum += of_trial(group, trials + i, 0.0f, rectified);
+            sum += of_trial(group, trials + i, 0.0f, how);
         for (int lane = 0; lane < LANES; lane++) found[lane] += sum[lane];
     }
 }
 
 /* Kinds of noise whose particles are computed side by side. */
-enum { PLAIN_CURVES, RECTIFIED_CURVES, OTHER_NOISE, GROUPS_OF_NOISE };
+enum { PLAIN_CURVES, RECTIFIED_CURVES, IN_LEVELS, OTHER_NOISE, GROUPS_OF_NOISE };
 
 INLINE int noise_group(const float *fields) {
-    return fields[NOISE] == RECRUITMENT ? PLAIN_CURVES : fields[NOISE] == RECTIFIED ? RECTIFIED_CURVES : OTHER_NOISE;
+    return fields[NOISE] == RECRUITMENT ? PLAIN_CURVES
+           : fields[NOISE] == RECTIFIED ? RECTIFIED_CURVES
+           : fields[NOISE] == BY_LEVELS ? IN_LEVELS
+                                        : OTHER_NOISE;
 }
 
 /* Log likelihood of trials under a lane each of particles whose noise is of one group. */
 static void lanes_likelihood(const Particles *particles, int of_noise, const Trial *trials, int64_t count, int shares,
                              double *found) {
-    Group group = group_of(particles, of_noise != OTHER_NOISE, of_noise == RECTIFIED_CURVES);
+    int how = of_noise == RECTIFIED_CURVES ? FROM_A_THRESHOLD : of_noise == IN_LEVELS ? LEVEL_BY_LEVEL : ALONG;
+    Group group = group_of(particles, of_noise != OTHER_NOISE, how);
     if (shares)
         sharing_likelihood(&group, trials, count, found);
-    else if (of_noise == RECTIFIED_CURVES)
-        summed_likelihood(&group, trials, count, 1, found);
+    else if (how == FROM_A_THRESHOLD)
+        summed_likelihood(&group, trials, count, FROM_A_THRESHOLD, found);
+    else if (how == LEVEL_BY_LEVEL)
+        summed_likelihood(&group, trials, count, LEVEL_BY_LEVEL, found);
     else
-        summed_likelihood(&group, trials, count, 0, found);
+        summed_likelihood(&group, trials, count, ALONG, found);
 }
 
 /* Trials from the columns that a history has; whether any share a factor of their known parts. */
@@ -353,9 +402,10 @@ static void some_likelihood(const float *fields, const int64_t *numbers, int cou
                             const Trial *trials, int64_t count, int shares, float *found) {
     Particles some;
     double of_lane[LANES];
+    int known = of_noise == IN_LEVELS ? FIELDS : LEVEL_AT;
     for (int lane = 0; lane < LANES; lane++) { /* lanes that are left over repeat the last particle */
         const float *one = fields + numbers[lane < count_of ? lane : count_of - 1] * FIELDS;
-        for (int field = 0; field < FIELDS; field++) some.of[field][lane] = one[field];
+        for (int field = 0; field < known; field++) some.of[field][lane] = one[field];
     }
     lanes_likelihood(&some, of_noise, trials, count, shares, of_lane);
     for (int lane = 0; lane < count_of; lane++) found[numbers[lane]] = (float)of_lane[lane];

@@ -6,6 +6,8 @@
 
 #include "vectors.h"
 
+enum { LEVELS = 8 }; /* intensities at which pulses were given alone, at most */
+
 /* Fields of a particle: what its latents mean. Logarithms are natural, amplitudes in EMG floors. */
 enum {
     NOISE,      /* kind of the noise */
@@ -35,7 +37,10 @@ enum {
     STEP_DRIVE, /* by how much the drive grows from then on [logits] */
     FADING,     /* by how many halves the enhancement fades from trial to trial; negative where it grows */
     STEP_SCALE, /* log of what all amplitudes are multiplied by from then on */
-    FIELDS
+    LEVEL_AT,   /* of a law by levels: how much stronger their pulses were than the pairs' [% RMT], ascending, */
+    LEVEL_MEAN = LEVEL_AT + LEVELS, /* mean log MEP [log mV], */
+    LEVEL_SD = LEVEL_MEAN + LEVELS, /* and its SD */
+    FIELDS = LEVEL_SD + LEVELS
 };
 
 /* Columns of a trial. */
@@ -54,7 +59,7 @@ enum {
     COLUMNS
 };
 
-enum { CONSTANT_CV, MISSING, RECRUITMENT, ALL_OR_NONE, RECTIFIED };                   /* NoiseKind */
+enum { CONSTANT_CV, MISSING, RECRUITMENT, ALL_OR_NONE, RECTIFIED, BY_LEVELS };        /* NoiseKind */
 enum { GAUSSIAN, SKEWED, PLATEAU, TWO_PEAK };                                         /* ShapeKind */
 enum { NO_CHANGE, LEVEL_CHANGE, INTENSITY_CHANGE, ENHANCEMENT_CHANGE, SCALE_CHANGE }; /* ChangeKind */
 enum { OF_SHAPE, OF_NOISE, OF_PRESENT, OF_DEPRESSED, OF_CHANGE, KINDS };              /* kinds of a particle */
@@ -78,7 +83,10 @@ INLINE void gain_of(float order, float *startle, float *relaxed) {
     *relaxed = 1.0f - exp_1(-0.030459207f * order); /* log 0.97 */
 }
 
-INLINE int is_curved(const float *fields) { return fields[NOISE] == RECRUITMENT || fields[NOISE] == RECTIFIED; }
+/* Whether it knows what pulses of another intensity evoke. */
+INLINE int is_curved(const float *fields) {
+    return fields[NOISE] == RECRUITMENT || fields[NOISE] == RECTIFIED || fields[NOISE] == BY_LEVELS;
+}
 
 /* The share of the enhancement that there is after so many trials, where it fades or grows. */
 INLINE float enhancement_after(float fading, float order) {
@@ -92,6 +100,8 @@ static void settle(float *fields, float order) {
         fields[LOG_RATIO] += fields[STEP];
         fields[REST] += fields[STEP_DRIVE];
         fields[LOG_FLOOR] += fields[STEP_SCALE];
+        for (int level = 0; level < LEVELS && fields[NOISE] == (float)BY_LEVELS; level++)
+            fields[LEVEL_MEAN + level] += fields[STEP_SCALE];
     }
     if (fields[FADING] != 0.0f) {
         float share = enhancement_after(fields[FADING], order), kind = fields[NOISE];

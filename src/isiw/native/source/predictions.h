@@ -43,12 +43,20 @@ static int evoked_means(int64_t samples, int64_t rows, const float *fields, floa
     table_rows(samples, rows, fields, levels);
     for (int64_t i = 0; i < samples; i++) {
         const float *one = fields + i * FIELDS;
-        int curved = is_curved(one), whole = one[NOISE] == ALL_OR_NONE;
+        int by_levels = one[NOISE] == BY_LEVELS, curved = is_curved(one) && !by_levels, whole = one[NOISE] == ALL_OR_NONE;
         float ratio = exp_1(one[LOG_RATIO]);
         if (curved) ratio *= exp_1(0.5f * one[OUTPUT_SD] * one[OUTPUT_SD]) / (1.0f - one[ONSET]);
         for (int64_t row = 0; row < rows; row += LANES) {
             Reals level = loaded(levels + i * rows + row, rows - row), mean = whole ? all(1.0f) : level;
-            if (curved) {
+            if (by_levels) {
+                Particles particle = alike(one);
+                Curve law = levels_of(&particle);
+                Reals share[LEVELS];
+                mean = all(-1.0f);
+                shares_of_levels(particle.of, one[REST] + one[BOOST] * level, share);
+                for (int at = 0; at < LEVELS; at++)
+                    mean += share[at] * (1.0f + law.odds[at]) * exp_v(0.5f * law.between[at]);
+            } else if (curved) {
                 mean = all(0.0f);
                 for (int q = 0; q < NODES; q++) {
                     Reals drive = one[REST] + one[SPREAD] * node_at[q] * (float)(1.0 / ON_NODES) + one[BOOST] * level;
@@ -62,12 +70,13 @@ static int evoked_means(int64_t samples, int64_t rows, const float *fields, floa
     return 0;
 }
 
-/* A particle's log-normal at each node and row: means and inverse SDs, (NODES, rows) each. */
+/* A particle's log-normal at each node and row: means, inverse SDs and weights, (NODES, rows) each. */
 static void components_of(const float *fields, float gain, const float *levels, int64_t rows, float *means,
-                          float *sds) {
+                          float *sds, float *weights) {
     Particles particle = alike(fields);
-    int curved = is_curved(fields), rectified = fields[ONSET] > 0.0f, whole = fields[NOISE] == ALL_OR_NONE;
-    Curve curve = curve_of(&particle, curved);
+    int curved = is_curved(fields), whole = fields[NOISE] == ALL_OR_NONE;
+    int how = fields[NOISE] == BY_LEVELS ? LEVEL_BY_LEVEL : fields[ONSET] > 0.0f ? FROM_A_THRESHOLD : ALONG;
+    Curve curve = how == LEVEL_BY_LEVEL ? levels_of(&particle) : curve_of(&particle, curved);
     Situation made = {.start = particle.of[ONSET],
                       .known = all(0.0f),
                       .responds = all(1.0f),
@@ -76,31 +85,35 @@ static void components_of(const float *fields, float gain, const float *levels, 
                       .scale = exp_v(particle.of[LOG_RATIO] + (gain + (curved ? 0.0f : FAR_BELOW)))};
     for (int64_t row = 0; row < rows; row += LANES) {
         Reals level = loaded(levels + row, rows - row);
+        if (how == LEVEL_BY_LEVEL)
+            shares_of_levels(particle.of, particle.of[REST] + particle.of[BOOST] * level, made.share);
         made.odds = curved  ? odds_against(particle.of[REST] + particle.of[BOOST] * level, LOWEST_DRIVE)
                     : whole ? all(1.0f)
                             : odds_of_level(level);
         for (int first = 0; first < NODES; first += TOGETHER_NODES) {
             Reals mean[TOGETHER_NODES], inverse_sd[TOGETHER_NODES];
-            components(&made, curve.odds + first, curve.between + first, rectified, mean, inverse_sd);
+            components(&made, curve.odds + first, curve.between + first, how, mean, inverse_sd);
             for (int q = 0; q < TOGETHER_NODES; q++) {
                 stored(mean[q], means + (first + q) * rows + row, rows - row);
                 stored(inverse_sd[q], sds + (first + q) * rows + row, rows - row);
+                stored(weight_of(&made, how, first + q), weights + (first + q) * rows + row, rows - row);
             }
         }
     }
 }
 
 /* Probabilities of outcomes (y,) by their log MEPs and widths in one row. */
-static void outcomes_of(const float *fields, float responds, const float *means, const float *sds, int64_t rows,
-                        const float *log_mep, const float *widths, int64_t outcomes, float *found) {
+static void outcomes_of(const float *fields, float responds, const float *means, int64_t rows, const float *log_mep,
+                        const float *widths, int64_t outcomes, float *found) {
+    const float *sds = means + NODES * rows, *weights = sds + NODES * rows;
     float silent_sd = 1.0f / fields[FLOOR_SD];
     for (int64_t y = 0; y < outcomes; y += LANES) {
         Reals over = loaded(log_mep + y, outcomes - y) - fields[LOG_FLOOR], evoked = all(0.0f);
         for (int first = 0; first < NODES; first += TOGETHER_NODES) {
-            const float *mean = means + first * rows, *sd = sds + first * rows;
+            const float *mean = means + first * rows, *sd = sds + first * rows, *weight = weights + first * rows;
             Reals bell[TOGETHER_NODES];
             EACH_NODE bell[q] = bell_v((over - mean[q * rows]) * sd[q * rows]);
-            EACH_NODE evoked += node_weight[first + q] * sd[q * rows] * bell[q];
+            EACH_NODE evoked += weight[q * rows] * sd[q * rows] * bell[q];
         }
         Reals silent = silent_sd * bell_v(over * silent_sd);
         Reals outlier = pick((over > LOG_2) & (over < LOG_200), all(OUTLIER_DENSITY), all(0.0f)) + 1e-6f;
@@ -145,22 +158,23 @@ static void outcomes_between(const float *ends, const float *cells, int64_t outc
     }
 }
 
-/* A particle's table after so many trials, at least the rows that are needed; room is for 2 NODES rows. */
+/* A particle's table after so many trials, at least the rows that are needed; room is for 3 NODES rows. */
 static void table_of(const float *fields, int64_t order, const float *levels, int64_t rows, const uint8_t *needed,
                      const float *cells, int64_t outcomes, float *room, float *table) {
     float startle, relaxed, *sds = room + NODES * rows;
     gain_of((float)order, &startle, &relaxed);
-    components_of(fields, fields[DRIFT] * relaxed + fields[STARTLED] * startle, levels, rows, room, sds);
+    float gain = fields[DRIFT] * relaxed + fields[STARTLED] * startle;
+    components_of(fields, gain, levels, rows, room, sds, sds + NODES * rows);
     for (int64_t row = 0; row < rows; row++)
         if (!needed || needed[row])
-            outcomes_of(fields, responses(fields, all(levels[row]))[0], room + row, sds + row, rows, cells,
-                        cells + outcomes, outcomes, table + row * outcomes);
+            outcomes_of(fields, responses(fields, all(levels[row]))[0], room + row, rows, cells, cells + outcomes,
+                        outcomes, table + row * outcomes);
 }
 
 static int outcome_tables(int64_t people, int64_t samples, int64_t rows, int64_t outcomes, int64_t order,
                           const float *fields, const float *levels, const float *means, const float *cells,
                           float *ends, float *table) {
-    int64_t of_rows = 2 * NODES * rows;
+    int64_t of_rows = 3 * NODES * rows;
     float *room = malloc((size_t)(of_rows + samples + 2 * outcomes) * sizeof *room);
     if (!room) return -1;
     float *between = room + of_rows + samples;

@@ -33,6 +33,7 @@ enum {
     LOW_START_MS,
     LOW_LOG_WIDTH_MS,
     LOW_LOG_SHIFT,
+    OF_LEVELS, /* LEVEL_AT and what follows it among the fields, which particles carry along and never move */
     MEANINGS
 };
 enum { LOG_CEILING, LOG_SLOPE, LOG_INPUT_SD, LOG_SIGMA_Y, LOG_BOOST, REST_PCT }; /* of a curve */
@@ -41,6 +42,7 @@ enum { MOST_OF_BLOCK = 32, MOST_BLOCKS = 64 }; /* how many latents a block has, 
 #define NEVER (-1e30f)      /* log density of what cannot be */
 #define UNKNOWN 1e30f       /* in place of a log density that was not worked out yet */
 #define MOST_ONSET 0.9f     /* a threshold further up a curve would leave nothing of it */
+#define LOG_NO_SD (-7.0f)   /* log SD of a floor that does not vary: levels have all that varies */
 #define INTENSITY_PCT 9.0f  /* by how much the intensity changes at a size of 1 [% RMT] */
 #define FADING_HALVES 0.04f /* by how many halves the enhancement changes from trial to trial at a size of 1 */
 
@@ -48,10 +50,14 @@ enum { MOST_OF_BLOCK = 32, MOST_BLOCKS = 64 }; /* how many latents a block has, 
 trials, which moves screen proposals by. */
 INLINE int64_t kept_of(const Tables *tables) { return tables->blocks + 1; }
 
+/* How many fields particles have: those of levels where some may have a law by them. */
+INLINE int fields_of(const Tables *tables) { return tables->at[OF_LEVELS] < tables->latents ? FIELDS : LEVEL_AT; }
+
 /* Whether kinds (p, KINDS) are some that there are. */
 static int known_kinds(const Tables *tables, int64_t particles, const int64_t *kinds) {
     uint64_t changes = (uint64_t)tables->kind_values, beyond = 0;
-    const uint64_t last[KINDS] = {TWO_PEAK, RECTIFIED, 1, 1, changes < SCALE_CHANGE ? changes : SCALE_CHANGE};
+    uint64_t noise = fields_of(tables) == FIELDS ? BY_LEVELS : RECTIFIED;
+    const uint64_t last[KINDS] = {TWO_PEAK, noise, 1, 1, changes < SCALE_CHANGE ? changes : SCALE_CHANGE};
     for (int64_t i = 0; i < particles; i++)
         for (int kind = 0; kind < KINDS; kind++) beyond |= (uint64_t)kinds[i * KINDS + kind] > last[kind];
     return !beyond;
@@ -84,14 +90,15 @@ static Particles meaning_of(const Tables *tables, const Lanes *lanes) {
     Particles made;
     Reals *of = made.of, onset, size;
     Wholes curved, rectified, change;
-    memset(&made, 0, sizeof made);
+    memset(&made, 0, LEVEL_AT * sizeof *of); /* levels are read where there are some alone */
     for (int lane = 0; lane < LANES; lane++) {
         const float *z = lanes->z[lane];
         const int64_t *kinds = lanes->kinds[lane];
         int64_t noise = kinds[OF_NOISE];
         of[NOISE][lane] = (float)noise, of[SHAPE][lane] = (float)kinds[OF_SHAPE];
         of[PRESENT][lane] = (float)kinds[OF_PRESENT], change[lane] = (int32_t)kinds[OF_CHANGE];
-        rectified[lane] = -(noise == RECTIFIED), curved[lane] = -(noise == RECRUITMENT || noise == RECTIFIED);
+        rectified[lane] = -(noise == RECTIFIED);
+        curved[lane] = -(noise == RECRUITMENT || noise == RECTIFIED || noise == BY_LEVELS);
 #define LATENT(meaning) latent_of(tables, z, meaning)
         of[START][lane] = LATENT(START_MS), of[WIDTH][lane] = LATENT(LOG_WIDTH_MS);
         of[FORM][lane] = kinds[OF_SHAPE] ? erff(LATENT(FORM_SCORE) * 0.70710678f) : 0.0f;
@@ -104,7 +111,14 @@ static Particles meaning_of(const Tables *tables, const Lanes *lanes) {
             of[DEPTH][lane] = LATENT(LOW_LOG_SHIFT) - LATENT(CURVE_LATENTS + LOG_BOOST);
         }
         int64_t curve = noise == RECTIFIED ? RECTIFIED_LATENTS : CURVE_LATENTS, large = noise == ALL_OR_NONE;
-        if (curved[lane]) {
+        if (noise == BY_LEVELS) { /* whose drive is in % RMT, and whose floor is the lowest level */
+            const float *levels = z + tables->at[OF_LEVELS];
+            for (int field = LEVEL_AT; field < FIELDS; field++) of[field][lane] = levels[field - LEVEL_AT];
+            of[LOG_FLOOR][lane] = of[LEVEL_MEAN][lane], of[FLOOR_SD][lane] = LOG_NO_SD;
+            for (int level = 1; level < LEVELS; level++)
+                of[LOG_FLOOR][lane] = least_1(of[LOG_FLOOR][lane], of[LEVEL_MEAN + level][lane]);
+            of[BOOST][lane] = LATENT(CURVE_LATENTS + LOG_BOOST), onset[lane] = 0.0f;
+        } else if (curved[lane]) {
             of[LOG_RATIO][lane] = LATENT(curve + LOG_CEILING), of[SPREAD][lane] = LATENT(curve + LOG_INPUT_SD);
             of[OUTPUT_SD][lane] = LATENT(curve + LOG_SIGMA_Y), of[SLOPE][lane] = LATENT(curve + LOG_SLOPE);
             of[BOOST][lane] = LATENT(curve + LOG_BOOST), of[REST][lane] = LATENT(curve + REST_PCT);
@@ -140,11 +154,12 @@ static Particles meaning_of(const Tables *tables, const Lanes *lanes) {
 /* What numbered particles mean, each at its number, (p, FIELDS). */
 static void meanings_of(const Tables *tables, const float *values, int64_t stride, const int64_t *kinds,
                         const int64_t *numbers, int64_t count, float *fields) {
+    int known = fields_of(tables);
     for (int64_t first = 0; first < count; first += LANES) {
         Lanes lanes = lanes_of(values, stride, kinds, numbers + first, count - first);
         Particles made = meaning_of(tables, &lanes);
         for (int lane = 0; lane < LANES && first + lane < count; lane++)
-            for (int field = 0; field < FIELDS; field++)
+            for (int field = 0; field < known; field++)
                 fields[numbers[first + lane] * FIELDS + field] = made.of[field][lane];
     }
 }

@@ -74,7 +74,8 @@ INLINE Reals facilitation(const Profiles *profiles, Reals isi_ms) {
 /* The same particle in all lanes. */
 INLINE Particles alike(const float *fields) {
     Particles made;
-    for (int field = 0; field < FIELDS; field++) made.of[field] = all(fields[field]);
+    int known = fields[NOISE] == (float)BY_LEVELS ? FIELDS : LEVEL_AT;
+    for (int field = 0; field < known; field++) made.of[field] = all(fields[field]);
     return made;
 }
 

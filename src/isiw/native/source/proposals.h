@@ -148,6 +148,10 @@ static int64_t jump(const Chain *chain, uint64_t *dice, float *z, int64_t *kinds
     const Tables *tables = chain->tables;
     int64_t number = which(uniform(dice), tables->jumps, tables->jump_count - 1);
     const uint8_t *redrawn = tables->redrawn + number * tables->latents, *renewed = tables->renewed + number * KINDS;
+    if (kinds[OF_NOISE] == BY_LEVELS && redrawn[tables->at[CURVE_LATENTS]]) { /* what pulses have taught is kept */
+        *ratio = -INFINITY;
+        return number;
+    }
     for (uint64_t wanted = chain->touched[tables->states * tables->part_count + number]; wanted;) {
         int64_t block = next_of(&wanted), first = tables->first[block], behind = first + tables->size[block];
         draw_block(tables, block, dice, chain->redrawn);
