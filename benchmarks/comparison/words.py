@@ -217,7 +217,12 @@ def ratio_of(line: Mapping[str, Any], criterion: float) -> str:
         return "–"
     if bound:
         return f"{'<' if bound == 'below' else '>'} {short(ratio)}"
-    return f"{short(ratio)} ({short(line[f'low_{criterion}'])} to {short(line[f'high_{criterion}'])})"
+    low, high = line[f"low_{criterion}"], line[f"high_{criterion}"]
+    if math.isnan(low):
+        return f"{short(ratio)} (no interval)"
+    return (
+        f"{short(ratio)} ({short(low)} to {short(high)})" if math.isfinite(high) else f"{short(ratio)} (≥ {short(low)})"
+    )
 
 
 def readable(table: pd.DataFrame) -> pd.DataFrame:

@@ -16,7 +16,7 @@ from benchmarks.comparison import running
 from benchmarks.comparison.measures import lasting, ratio, table_of
 from benchmarks.comparison.rows import EVEN, GUESS, Part, chosen, matrix, parts
 from benchmarks.comparison.running import RECORDED, Plan, recorded_units, rows_of, run_part
-from benchmarks.comparison.words import choosing, compared_rows, readme_table, saving, sentences, trusting
+from benchmarks.comparison.words import choosing, compared_rows, ratio_of, readme_table, saving, sentences, trusting
 from benchmarks.quick import expanded
 
 import isiw
@@ -54,6 +54,15 @@ def test_a_ratio_is_a_bound_where_one_of_both_does_not_reach_it() -> None:
         found = ratio(own, even, MARKS, 0.7)
         assert (found["bound"], found["ratio"]) == (bound, pytest.approx(value))
     assert ratio(bad, bad, MARKS, 0.7)["bound"] == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [(0.3, 0.7, ".50 (.30 to .70)"), (0.3, math.inf, ".50 (≥ .30)"), (math.nan, math.nan, ".50 (no interval)")],
+)
+def test_an_interval_says_which_of_its_ends_nobody_knows(low: float, high: float, said: str) -> None:
+    line = {"strategy": "default", "bound_0.7": "", "ratio_0.7": 0.5, "low_0.7": low, "high_0.7": high}
+    assert ratio_of(line, 0.7) == said
 
 
 def rows_with(means: Mapping[str, tuple[float, ...]], cohort: str = "recruitment") -> pd.DataFrame:
