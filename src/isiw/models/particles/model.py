@@ -164,7 +164,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         values, own = self.swarm.crowd.values.copy(), np.flatnonzero(latents_of("changed", "change"))
         values[..., own] = np.where(chosen[..., np.newaxis], noted, values[..., own])
         kinds = latents.with_kind("change", np.where(chosen, kind, latents.change)).kinds
-        law, usual = self._laws(model, by_levels=self.swarm.carried > 0)
+        law, usual = self._laws(model, by_levels=self.swarm.given is not None)
         log_weights = self.swarm.log_weights + np.where(untouched, math.log(share + left), math.log(left))
         log_weights -= log_sum(log_weights)[:, np.newaxis]
         nothing, log_likelihood = law.nothing_known(*kind.shape), self.swarm.crowd.log_likelihood

@@ -106,8 +106,7 @@ class Swarm:
     health: Health | None = None  # after the last trial; None before the first
     chosen_by: tuple[Law, Law] | None = None  # their law, and the one that weighs them instead where ISIs are chosen
     halves: int = 1  # 2 where the second half of the particles does not learn from pulses given alone
-    carried: int = 0  # numbers behind the latents: `CARRIED` where some particles have a law by levels
-    given: History | None = None  # pulses given alone that such a law stands for
+    given: History | None = None  # pulses given alone that a law by levels stands for, which particles may carry along
 
     @classmethod
     def of(cls, law: Law, people: int, particles: int, seed: int) -> Swarm:
@@ -125,7 +124,8 @@ class Swarm:
 
     def named(self, crowd: Crowd) -> Latents:
         """The latents of particles, without what they carry along."""
-        return Latents(crowd.values[..., : crowd.values.shape[-1] - self.carried], crowd.kinds)
+        carried = 0 if self.given is None else CARRIED
+        return Latents(crowd.values[..., : crowd.values.shape[-1] - carried], crowd.kinds)
 
     @cached_property
     def log_weights(self) -> FloatArray:
@@ -206,7 +206,7 @@ class Swarm:
             values[::2, -CARRIED:] = drawn(own, len(values[::2]), rng)
             kinds[:, 1] = NoiseKind.BY_LEVELS
         given = History(self.history.columns[:, self._are_given])
-        return replace(begun, crowd=crowd, evidence=self.evidence, bets=self.bets, carried=CARRIED, given=given)
+        return replace(begun, crowd=crowd, evidence=self.evidence, bets=self.bets, given=given)
 
     @property
     def _are_given(self) -> BoolArray:
