@@ -70,7 +70,8 @@ class Window:
             )
         if not inside.any():
             return None
-        steps = np.flatnonzero(np.diff(np.concatenate(([False], inside, [False])).astype(int)))
+        padded = np.concatenate(([False], inside, [False]))
+        steps = np.flatnonzero(padded[1:] != padded[:-1])
         segments = tuple((float(grid[a]), float(grid[b - 1])) for a, b in zip(steps[::2], steps[1::2], strict=True))
         return cls(segments[0][0], segments[-1][1], segments)
 

@@ -211,7 +211,8 @@ class Prior(Checked):
         # A law by levels was made of a curve that the same pulses taught, and is of its muscle.
         curved = (latents.noise == NoiseKind.RECRUITMENT) | (latents.noise == NoiseKind.BY_LEVELS)
         found: IntArray = self._hypothesis_numbers[latents.noise, 0]
-        curve = self.mixtures["recruitment"].component(latents.values[curved][:, _OF_CURVE])
+        values = latents.values.reshape(-1, latents.values.shape[-1])
+        curve = self.mixtures["recruitment"].component(values.take(np.flatnonzero(curved), axis=0)[:, _OF_CURVE])
         found[curved] = self._hypothesis_numbers[NoiseKind.RECRUITMENT, curve]
         return found
 

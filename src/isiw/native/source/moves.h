@@ -33,14 +33,14 @@ static void densities_of(const Tables *tables, int64_t block, const float *value
 /* Work out the ratio of prior densities of what differences moved. Densities of the particles themselves are kept. */
 static void weigh_shifts(const Tables *tables, const Proposals *to, int64_t size, const float *old,
                          const int64_t *kinds, float *densities) {
-    int64_t *numbers = to->numbers;
+    int64_t *numbers = to->numbers, *unknowns = numbers + size;
     for (int64_t block = 0; block < tables->blocks; block++) {
         int64_t count = 0, unknown = 0;
-        for (int64_t i = 0; i < size; i++)
-            if (to->moved[i] >> block & 1 && densities[i * kept_of(tables) + block] == UNKNOWN) numbers[unknown++] = i;
-        densities_of(tables, block, old, kinds, numbers, unknown, densities);
-        for (int64_t i = 0; i < size; i++)
-            if (to->moved[i] >> block & 1) numbers[count++] = i;
+        /* Without branches, which the processor would guess wrongly. */
+        for (int64_t i = 0; i < size; i++) numbers[count] = i, count += to->moved[i] >> block & 1;
+        for (int64_t n = 0; n < count; n++)
+            unknowns[unknown] = numbers[n], unknown += densities[numbers[n] * kept_of(tables) + block] == UNKNOWN;
+        densities_of(tables, block, old, kinds, unknowns, unknown, densities);
         densities_of(tables, block, to->z, to->kinds, numbers, count, to->found);
         for (int64_t n = 0; n < count; n++) {
             int64_t at = numbers[n] * kept_of(tables) + block;
@@ -58,8 +58,7 @@ typedef struct {
 /* Work out what those mean whose likelihood is wanted. */
 static void meanings_wanted(const Tables *tables, const Proposals *to, int64_t size) {
     int64_t wanted = 0;
-    for (int64_t i = 0; i < size; i++)
-        if (to->wanted[i]) to->numbers[wanted++] = i;
+    for (int64_t i = 0; i < size; i++) to->numbers[wanted] = i, wanted += to->wanted[i];
     meanings_of(tables, to->z, tables->latents, to->kinds, to->numbers, wanted, to->fields);
 }
 
@@ -119,8 +118,10 @@ static void move_half(const Chain *chain, const Proposals *to, State *state, uin
     for (int64_t i = 0; i < size; i++) {
         to->dice[i] = stream_of(sweep, first + i);
         propose(chain, to, i, old + i * latents, kinds + i * KINDS, state->values + theirs * latents, others);
-        to->log_u[i] = log_1(most_1(uniform(to->dice + i), 1e-30f));
+        to->log_u[i] = most_1(uniform(to->dice + i), 1e-30f);
     }
+    for (int64_t i = 0; i < size; i += LANES)
+        stored(log_v(loaded(to->log_u + i, size - i)), to->log_u + i, size - i);
     weigh_shifts(tables, to, size, old, kinds, densities);
     for (int64_t i = 0; i < size; i++) {
         if (tables->apart && overlap(tables, to->z + i * latents)) to->ratio[i] = -INFINITY;
@@ -165,7 +166,7 @@ static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64
                     .log_u = malloc(each * sizeof(float)),
                     .ratio = malloc(each * sizeof(double)),
                     .kinds = malloc(each * KINDS * sizeof(int64_t)),
-                    .numbers = malloc(each * sizeof(int64_t)),
+                    .numbers = malloc(2 * each * sizeof(int64_t)),
                     .dice = malloc(each * sizeof(uint64_t)),
                     .moved = malloc(each * sizeof(uint64_t)),
                     .jumped = malloc(each),

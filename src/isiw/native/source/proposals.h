@@ -223,7 +223,7 @@ typedef struct {
     float *log_u;     /* log of the draw that decides, less that of the first step's probability */
     double *ratio;    /* of prior densities and proposals, natural log */
     int64_t *kinds;   /* (half, KINDS) */
-    int64_t *numbers; /* room for numbers of some of them, (half,) */
+    int64_t *numbers; /* room for numbers of some of them, (2, half) */
     uint64_t *dice;   /* streams of draws */
     uint64_t *moved;  /* blocks that a difference moves, as bits */
     uint8_t *jumped;  /* whether it is a jump */

@@ -104,6 +104,13 @@ INLINE int any(Wholes where) {
 
 INLINE Reals absolute(Reals x) { return most_v(x, -x); }
 
+#if defined(__AVX2__) && !defined(__AVX512F__)
+/* The first of the lanes, so many, as the processor wants them said. */
+INLINE __m256i first_lanes(int64_t count) {
+    return _mm256_cmpgt_epi32(_mm256_set1_epi32((int)count), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+}
+#endif
+
 /* Some of an array's numbers as lanes, 0 behind the last of those that are left; and back. */
 INLINE Reals loaded(const float *values, int64_t left) {
     Reals some = {0};
@@ -112,6 +119,8 @@ INLINE Reals loaded(const float *values, int64_t left) {
     else
 #if defined(__AVX512F__)
         some = (Reals)_mm512_maskz_loadu_ps((__mmask16)((1u << left) - 1u), values);
+#elif defined(__AVX2__)
+        some = (Reals)_mm256_maskload_ps(values, first_lanes(left));
 #else
         for (int lane = 0; lane < left; lane++) some[lane] = values[lane];
 #endif
@@ -123,6 +132,8 @@ INLINE void stored(Reals some, float *values, int64_t left) {
     else
 #if defined(__AVX512F__)
         _mm512_mask_storeu_ps(values, (__mmask16)((1u << left) - 1u), (__m512)some);
+#elif defined(__AVX2__)
+        _mm256_maskstore_ps(values, first_lanes(left), (__m256)some);
 #else
         for (int lane = 0; lane < left; lane++) values[lane] = some[lane];
 #endif
