@@ -103,7 +103,7 @@ def unfinished(plan: Plan, every: Sequence[Part], rows: pd.DataFrame) -> dict[st
 
 def main(  # noqa: PLR0913, PLR0917 - an option each
     people: Annotated[int, typer.Option(help="People of each cohort.")] = 200,
-    slow_people: Annotated[int, typer.Option(help="People for rows that take .1 s a trial or more.")] = 40,
+    slow_people: Annotated[int, typer.Option(help="People for rows of BoTorch and the parametric family.")] = 40,
     reference_people: Annotated[int, typer.Option(help="People for NUTS, half a minute a trial.")] = 2,
     trials: Annotated[int, typer.Option(help="Pairs a session.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = SEED,

@@ -49,7 +49,7 @@ def parts(slow_people: int, reference_people: int, rows: int = 0) -> tuple[Part,
     """All parts, the quick and most important ones first.
 
     Args:
-        slow_people: people of each cohort for rows that take .1 s a trial or more.
+        slow_people: people of each cohort for the rows of BoTorch and of the parametric family, which are slow.
         reference_people: of `recruitment` for the reference by NUTS, which takes half a minute a trial.
         rows: of each part but the first at most, for a quick look; 0 for all.
     """
@@ -60,8 +60,8 @@ def parts(slow_people: int, reference_people: int, rows: int = 0) -> tuple[Part,
         Part("regressions", _named("gpr", "svmr", "nr2")),
         Part("particles", matrix("particles")),
         Part("gp", (*_named("gp-straddle", "gp-variance", "gp-ei"), *matrix("gp")), batch=10),
+        Part("supra", _named("supra-threshold"), batch=10),
         Part("botorch", botorch, slow_people, 10),
-        Part("supra", _named("supra-threshold"), slow_people, 10),
         Part("parametric", (*_named("parametric-mi", "parametric-window"), *matrix("parametric")), slow_people, 10),
         Part("nuts", (nuts,), reference_people, 1, ("recruitment",)),
     )
