@@ -115,10 +115,10 @@ static void outcomes_of(const float *fields, float responds, const float *means,
             EACH_NODE bell[q] = bell_v((over - mean[q * rows]) * sd[q * rows]);
             EACH_NODE evoked += weight[q * rows] * sd[q * rows] * bell[q];
         }
-        Reals silent = silent_sd * bell_v(over * silent_sd);
+        if (responds < 1.0f)
+            evoked = responds * evoked + (1.0f - responds) * silent_sd * bell_v(over * silent_sd);
         Reals outlier = pick((over > LOG_2) & (over < LOG_200), all(OUTLIER_DENSITY), all(0.0f)) + 1e-6f;
-        Reals mixed = responds * evoked + (1.0f - responds) * silent;
-        Reals mass = (1.0f - OUTLIERS) * ROOT_PER_TURN * mixed + OUTLIERS * outlier;
+        Reals mass = (1.0f - OUTLIERS) * ROOT_PER_TURN * evoked + OUTLIERS * outlier;
         stored(mass * loaded(widths + y, outcomes - y), found + y, outcomes - y);
     }
     float per_sum = 1.0f / total(found, outcomes);
