@@ -14,7 +14,7 @@ from typing import Any, Final
 from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.existing import doubts, formats, frames, recordings
+from isiw.existing import doubtful_numbers, doubts, formats, frames, recordings
 from isiw.existing.apart import read_apart
 from isiw.existing.cells import dates_of, is_missing, latest_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered, spelt_otherwise
@@ -204,6 +204,7 @@ def _days(columns: Columns, rows: list[int], dates: Mapping[int, dt.datetime]) -
 
 def _person(columns: Columns, reference: Reference, subject: str) -> Delivered:
     doubts.require_one_kind_each(columns)
+    doubtful_numbers.require_plain_numbers(columns)
     space, signals = anywhere(reference), SignalLimits()
     trials = [_trial(columns, row, number, space, signals) for number, row in enumerate(columns.rows)]
     trials, paired_pct_rmt = _with_intensities(trials, columns)

@@ -1,0 +1,105 @@
+"""What the numbers of a table say themselves: codes, marks, two units, rows that come twice, and no amplitudes."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from itertools import groupby
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.existing.delivered import LONGEST_ISI_MS
+from isiw.existing.doubts import ALL
+from isiw.findings import AMPLITUDE_MV
+
+if TYPE_CHECKING:
+    from isiw.existing.quantities import Columns
+
+_POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
+_FEW, _FEWEST = 3, 12  # in a table with fewer rows ISIs may come again by chance
+
+
+def require_plain_numbers(columns: Columns) -> None:
+    """Raise if the numbers of ISIs and amplitudes seem to be something else, in two units, or of each row twice."""
+    for doubt in (_require_isis, _require_one_unit, _require_one_row_each):
+        doubt(columns)
+
+
+def _require_isis(columns: Columns) -> None:
+    """Raise if one number among the ISIs is so frequent, or so far from the others, that it may stand for TMS alone."""
+    isi, paired = columns["isi"], columns.paired
+    isis_ms = [isi.number(row) for row in paired]
+    before = [isi_ms for isi_ms in isis_ms if (isi_ms or 0.0) < 0]
+    if len({*before}) > 1 and 2 * len(before) > len(paired) > 2 and isi.name not in columns.layout.where:
+        what = f"most ISIs of {isi.of} are below 0, as if the pulse came before the tap"
+        remedy = "If the tap came first, write them without the sign; if not, so that these trials do not count, say "
+        remedy += f'--where "{isi.name}={ALL}".'
+        raise InvalidValueError(what, got=f"{len(before)} of {len(paired)}", remedy=remedy)
+    if columns.layout.alone is not None or len(paired) < len(columns.rows):
+        return
+    numbered = any(isis_ms == list(range(first, first + len(paired))) for first in (0, 1))
+    if "order" not in columns.of and len(paired) >= _FEWEST and numbered:
+        what = f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows"
+        remedy = "Name that of the ISIs: --column isi=NAME; if these are, number the rows in a column called trial."
+        raise InvalidValueError(what, remedy=remedy)
+    times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
+    for odd in {min(times, default=0.0), max(times, default=0.0)}:
+        others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}
+        if times[odd] < 3 or len(others) < 2:
+            continue
+        frequent = odd <= 0 and (times[odd] >= 2 * max(others.values()) or _is_named(columns, odd))
+        if frequent or odd in {-1, -9, -99, -999, 99, 999} or odd > max(499.0, 2 * max(others)):
+            what = f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone"
+            remedy = f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never."
+            raise InvalidValueError(what, expected="what an ISI is, and what is TMS alone", remedy=remedy)
+
+
+def _is_named(columns: Columns, isi_ms: float) -> bool:
+    """True if a column that is not used has a word for the rows with one ISI that no other row has."""
+    of_isi = {row for row in columns.rows if columns["isi"].number(row) == isi_ms}
+    for column in columns.beside.values():
+        words = {column.text(row) for row in of_isi}
+        others = {column.text(row) for row in {*columns.rows} - of_isi}
+        if len(words) == 1 and words.isdisjoint(others) and not next(iter(words)).isdigit():
+            return True
+    return False
+
+
+def _require_one_unit(columns: Columns) -> None:
+    """Raise if some numbers cannot be what they are, are about a thousand times the others, and none lies between."""
+    mep, codes = columns["mep"], {"99", "999", "9999"} if columns["mep"].name not in columns.layout.where else ()
+    coded = [row for row in columns.rows if mep.text(row).removesuffix(".0") in codes]
+    if len(coded) >= _FEW and len({mep.text(row) for row in coded}) == 1:
+        remedy = f'If it does, leave these cells empty; if not, say --where "{mep.name}={ALL}".'
+        raise mep.refused(coded[0], "may stand for no amplitude", remedy)
+    for key, (least, most) in _POSSIBLE.items():
+        column = columns[key]
+        numbers = np.sort([number for row in columns.paired if (number := column.number(row)) and number > 0])
+        apart = int(np.argmax(np.diff(np.log(numbers)))) + 1 if len(numbers) > 2 * _FEW else 0
+        low, high = numbers[:apart], numbers[apart:]
+        if min(len(low), len(high)) < _FEW or not (low[-1] < least or high[0] > most) or high[0] < 8 * low[-1]:
+            continue
+        if 300 < np.median(high) / np.median(low) < 3000:
+            got = f"{len(low)} up to {low[-1] / column.factor:g} and {len(high)} from {high[0] / column.factor:g} on"
+            raise column.doubted("seems to be in two units", got, "Write all of them in one.")
+
+
+def _require_one_row_each(columns: Columns) -> None:
+    """Raise if the ISIs come twice as if each trial had a row a muscle: one after the other, or all of them again."""
+    isi = columns["isi"]
+    texts, meps = ([columns[key].text(row) for row in columns.rows] for key in ("isi", "mep"))
+    if "order" in columns.of or columns.layout.where or len(texts) < _FEWEST:
+        return
+    runs = [len([*each]) for _, each in groupby(texts)]
+    times, half = math.gcd(*runs), len(texts) // 2
+    are_whole = all(round(isi.number(row) or 0.0, 3).is_integer() for row in columns.paired)
+    again = texts[:half] == texts[half:] and not are_whole  # as realised ISIs never do
+    four = zip(*(zip(texts[n:], meps[n:], strict=False) for n in range(4)), strict=False)
+    times_of_four = Counter(rows for rows in four if len({mep for _, mep in rows}) == 4)
+    again |= max(times_of_four.values(), default=0) > 1  # nor four trials in a row
+    if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
+        what = f"the ISIs of {isi.of} come {max(times, 2)} times each, as if muscles had a row each, or each row twice"
+        remedy = "Leave one row for each trial; if each row is one, number them in a column called trial."
+        raise InvalidValueError(what, got=", ".join(texts[: 2 * max(times, 2)]), remedy=remedy)
