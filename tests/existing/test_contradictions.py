@@ -94,6 +94,14 @@ def test_a_sampling_rate_is_compared_with_the_times_in_the_file(tmp_path: Path) 
         read(tmp_path, text, f"rate_hz = 4000\n{COLUMNS.replace('mV', 'uV')}[channels]\n{TRIGGERS}")
 
 
+def test_a_cell_of_vectors_is_no_column(tmp_path: Path) -> None:
+    cell = np.empty(3, dtype=object)
+    cell[:] = [np.array([0.1, 0.2]), np.array([0.3, 0.4, 0.5]), np.array([0.2])]
+    scipy.io.savemat(tmp_path / "P01.mat", {"isi_ms": [20.0, 40.0, 60.0], "mep_mv": cell})
+    with pytest.raises(InvalidValueError, match=r"no column of P01\.mat is known to hold the amplitudes"):
+        read_people(tmp_path / "P01.mat", Layout(reference="impact"))
+
+
 def test_a_matrix_of_matlab_is_found_or_asked_about(tmp_path: Path) -> None:
     path, sweeps = tmp_path / "P01.mat", np.zeros((3, 100))
     layout = Layout("impact", units=("mV",), alone="", rate_hz=4000.0, pulse_at_ms=10.0, channels={"emg": "sweeps"})
@@ -190,6 +198,16 @@ def test_no_trial_is_lost_where_a_line_stands_between_them(text: str, kept: list
         return
     with pytest.raises(InvalidValueError, match="is no number"):
         of_text(text, tmp_path)
+
+
+@pytest.mark.parametrize("name", ["label", "subject", "trial"])
+def test_a_title_between_trials_is_asked_about_and_a_footer_is_not(name: str, tmp_path: Path) -> None:
+    rows = [f"{n if name == 'trial' else ''},{10 * n},{0.1 * n:.1f}" for n in range(1, 6)]
+    text = f"{name},isi_ms,mep_mv\n" + "\n".join([*rows[:2], "FDI,,", *rows[2:]]) + "\n"
+    with pytest.raises(InvalidValueError, match=rf"row 3 of the column '{name}' .* has a word and no trial"):
+        of_text(text, tmp_path)
+    (person,) = of_text(text.replace("FDI,,\n", "") + "Exported by LabApp,,\n", tmp_path)
+    assert len(person.trials) == 5
 
 
 @pytest.mark.parametrize(("bad", "good"), [("excluded", ""), ("bad", "ok"), ("rejected", "accepted"), ("yes", "no")])

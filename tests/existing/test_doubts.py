@@ -137,7 +137,7 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "before and after in a column called time": (table(time=of(["pre", "post"])), {}, "'time'.*(pre, post|post, pre)"),
     "a word for ISIs of 0": (table(code=np.where(ISIS > 20, 2, 1), stim=np.where(ISIS > 20, "cond", "uncond"))
                              .replace(20.0, 0.0), {}, "--alone 0 if"),
-    "numbers of rows": (table().assign(isi_ms=np.arange(1.0, 37.0)), {}, "in the column 'isi_ms' are the numbers of"),
+    "numbers of rows": (table().assign(isi_ms=np.arange(1.0, 37.0)), {}, "'isi_ms' .* seems to have codes"),
     "two columns of ISIs": (table(realised_isi_ms=ISIS + 40), {}, "isi_ms or realised_isi_ms"),
     "a unit beside that is another": (table(isi_unit=of(["s"])), {}, "'isi_ms .s.' says two units"),
     "a unit beside that changes": (renamed(isi_ms="ISI").assign(isi_unit=of(["s", "ms"])), {}, "says two units"),
@@ -161,6 +161,24 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "a column for each ISI": (pd.DataFrame({f"{isi} ms": [0.1, 0.2] for isi in (20, 40)}), {}, "write a row for each"),
     "two spellings of a code": (table(subject=of(["P07", "p-07"])), {}, "P07 differs .* only in case.*'p-07'"),
     "two columns of what is lost": (table(rejected=of([""]), artefact=of(["", "x"])), {}, "rejected or artefact"),
+    "an ISI a row, and columns of trials": (means("MEP1", MEP2=0.2, MEP3=0.3), {"columns": {"mep": "MEP1"},
+                                            "units": ("mV",)}, "'MEP2' .* is like isi_ms or MEP1"),
+    "two trials a row": (table(isi2_ms=ISIS[::-1], mep2_mv=ISIS / 99), {}, "'isi2_ms' .* is like isi_ms"),
+    "ISIs that were measured, by their numbers": (table(real=ISIS + 6), {}, "'real' .* is like isi_ms"),
+    "baselines of two names": (table().assign(isi_ms=np.where(np.arange(36) % 6, ISIS, 0.0),
+                               phase=of(["pre", *["go"] * 5, "post", *["go"] * 5])), {}, "6 rows .* have the ISI 0 ms"),
+    "a number for ISIs of 0": (table().assign(isi_ms=np.where(np.arange(36) % 9, ISIS, 0.0),
+                               conditioned=np.where(np.arange(36) % 9, 1, 0)), {}, "4 rows .* have the ISI 0 ms"),
+    "a long ISI in many rows": (table().assign(isi_ms=np.where(np.arange(36) % 3, ISIS, 450.0)), {}, "the ISI 450 ms"),
+    "a condition that stands in the first row alone": (table().assign(isi_ms=np.where(np.arange(36) < 8, 0.0, ISIS),
+                                                       condition=["TMS alone", *[""] * 7, "pairs", *[""] * 27]), {},
+                                                       "is empty, and the ISI there is that of TMS alone"),
+    "codes of ISIs by their numbers": (table().assign(isi_ms=ISIS / 20), {}, "'isi_ms' .* have codes; got '1, 2, 3"),
+    "responses that are yes or no": (table().assign(mep_mv=of([0, 1, 1])), {}, "have codes; got '0, 1'"),
+    "responses that are rated": (table().assign(mep_mv=of([0, 1, 2, 3])), {}, "'mep_mv' .* seems to have codes"),
+    "one amplitude": (table().assign(mep_mv=5.0), {}, "have codes; got '5'"),
+    "milliamperes": (renamed(mep_mv="Amplitude (mA)"), {"units": ("mV",)}, "a unit of no amplitudes; got 'mA'"),
+    "peaks": (renamed(mep_mv="MEP max (mV)"), {"columns": {"mep": "MEP max (mV)"}}, "of another measure"),
     "a value that is not there": (long("muscle", ["FCR", "FDI"]), {"where": {"muscle": "APB"}}, "one of FCR, FDI"),
 }  # fmt: skip
 
@@ -218,6 +236,10 @@ PLAIN: dict[str, pd.DataFrame] = {
     "yes and no of something else": table(response=np.where(ISIS > 60, 1, 0)),
     "one intensity": table(mso=of([55]), rmt=of([46])),
     "rows that are left out before": table()[3:],
+    "numbers of repetitions": table().assign(rep=lambda rows: rows.groupby("isi_ms").cumcount() + 1),
+    "times of pulses": table(t_tms_ms=ISIS + 100, mep2_mv=ISIS / 99),
+    "another muscle beside measured ISIs": table(mep2_mv=ISIS / 99).assign(isi_ms=np.linspace(9.1, 200.3, 36)),
+    "all below the limit": table().assign(mep_mv=0.0),
 }  # fmt: skip
 
 
@@ -228,6 +250,12 @@ def test_a_plain_table_is_read_whatever_it_resembles(kind: str, tmp_path: Path) 
     for source in (tmp_path / "P01.csv", PLAIN[kind]):
         (person,) = read_people(source, IMPACT)
         assert [trial.isi_ms for trial in person.trials.told] == expected["isi_ms"].tolist()
+
+
+@pytest.mark.parametrize("name", ["MEP (max - min) [mV]", "MEP max to min (mV)", "Peak-peak of max response (mV)"])
+def test_the_maximum_minus_the_minimum_is_an_amplitude_from_peak_to_peak(name: str) -> None:
+    (person,) = read_people(renamed(mep_mv=name), IMPACT.saying(columns={"mep": name}, units=("mV",)))
+    assert len(person.trials.told) == 36
 
 
 def test_numbers_of_trials_that_do_not_count_are_asked_about(tmp_path: Path) -> None:
@@ -389,7 +417,8 @@ def test_sweeps_whose_time_0_is_not_at_the_pulse_are_asked_about(later_s: float)
 
 
 def test_emg_that_is_not_rectified_is_not_said_to_be(tmp_path: Path) -> None:
-    made = raw()
+    made, artefact = raw(), np.convolve(pulsed(1, NAMES["pulse"], 0.02), np.exp(-np.arange(40) / 4))
+    made.apply_function(lambda values: values + artefact[: len(values)], picks="all")  # nor is what a pulse does itself
     made.apply_function(lambda values: values + 2e-3, picks="all")  # an offset is none
     assert read_people(made, KNOWN)[0].notes == ()
     assert read_people(as_edf(tmp_path), KNOWN)[0].notes == ()
@@ -415,6 +444,13 @@ def test_events_of_two_names_that_may_mark_the_pulse_are_asked_about() -> None:
     )
     with pytest.raises(IsiwError, match="events of 2 names in the recording may mark the pulse"):
         read_people(two, Layout(reference="impact", channels={"emg": "FCR"}, unmarked="alone"))
+
+
+def test_events_of_which_nothing_is_read_are_said() -> None:
+    last_s = recording()[1][-2][0]
+    alone = with_events(lambda rows: [*[row for row in rows if row[0] <= last_s + 1], (0.5, "S  3"), (0.6, "S  3")])
+    (person,) = read_people(alone, KNOWN)
+    assert person.notes == ("Nothing is read of the events 'S  3' (2). Do some mark stimuli?",)
 
 
 @pytest.mark.parametrize(("marks", "later_s", "says"), [("tap", 0.008, "2 taps"), ("pulse", 0.15, "have one tap")])
@@ -453,6 +489,13 @@ def test_a_trigger_whose_level_turns_at_each_stimulus_is_asked_about() -> None:
     turns = 5.0 * (np.cumsum(pulsed(1, NAMES["pulse"], 1.0)) % 2)
     with pytest.raises(IsiwError, match="which of its edges are stimuli"):
         read_people(with_stim(turns, "emg"), Layout(reference="impact", channels={"emg": "FCR", "pulse": "STI"}))
+
+
+def test_a_wave_in_the_place_of_a_trigger_is_asked_about() -> None:
+    force = np.convolve(pulsed(1, NAMES["tap"], 1.0), np.hanning(80))[: len(EMG_MV)]
+    force *= np.linspace(1, 5, len(force))
+    with pytest.raises(IsiwError, match="'STI' has more than two levels, as a wave of force or acceleration"):
+        read_people(with_stim(force, "emg"), Layout(reference="impact", channels={"emg": "FCR", "tap": "STI"}))
 
 
 @pytest.mark.parametrize("change", [np.abs, lambda emg: np.abs(emg) - 0.02, lambda emg: -np.abs(emg)])

@@ -59,6 +59,36 @@ def test_rows_that_excel_shows_otherwise_than_they_are_read_are_asked_about(
     assert (len(usual), len({of_one[row].isi_ms for row in (2, 3, 4)})) == (36, 1)
 
 
+def test_a_few_rows_of_a_colour_of_their_own_are_flags_unless_another_column_says_why(tmp_path: Path) -> None:
+    def coloured(number: int, rows: list[int], more: dict[str, Any], *, text: bool = False) -> Path:
+        red = openpyxl.styles.PatternFill("solid", fgColor=openpyxl.styles.colors.Color(theme=5))
+        with pd.ExcelWriter(tmp_path / f"P{number}.xlsx", engine="openpyxl") as book:
+            table().assign(**more).to_excel(book, index=False, sheet_name="Data")
+            for cell in (cell for row in rows for cell in book.sheets["Data"][row + 2]):
+                if text:
+                    cell.font = openpyxl.styles.Font(color="FFFF0000")
+                else:
+                    cell.fill = red
+        return tmp_path / f"P{number}.xlsx"
+
+    for number, text in enumerate((True, False)):
+        path = coloured(number, [3, 8], {}, text=text)
+        with pytest.raises(IsiwError, match=r"row 4 of the column 'flag by colour'.*exclude=flag by colour.*colour=\*"):
+            read_people(path, IMPACT)
+        (person,) = read_people(path, IMPACT.saying(columns={"exclude": "flag by colour"}))
+        assert [trial.index for trial in person.trials if not trial.told] == [3, 8]
+    of_isi = np.flatnonzero(table()["isi_ms"] == 100.0).tolist()
+    excluded = [int(row in (3, 8)) for row in range(36)]
+    kinds: list[tuple[list[int], dict[str, Any]]] = [
+        (of_isi, {}),
+        ([3, 8], {"exclude": excluded}),
+        ([*range(0, 36, 2)], {}),
+    ]
+    for number, (rows, more) in enumerate(kinds, 2):
+        (person,) = read_people(coloured(number, rows, more), IMPACT)
+        assert len(person.trials.told) == 36 - sum(more.get("exclude", []))
+
+
 def test_a_unit_beside_numbers_is_theirs_in_a_table_and_in_a_structure_of_matlab(tmp_path: Path) -> None:
     numbers: dict[str, Any] = {"isi": [0.03, 0.06, 0.09], "isi_unit": "s", "mep": [400.0, 900.0, 160.0]}
     scipy.io.savemat(tmp_path / "P01.mat", {"trials": {**numbers, "mep_units": "uV"}})

@@ -200,6 +200,7 @@ WRITTEN: dict[str, tuple[str, str, dict[str, Any]]] = {
     "units in the cells": (
         "ISI,MEP\n", "10 ms,0.123456789012 mV\n20.5 ms,0.2 mV\n30 ms,1.5 mV\n40 ms,0.75 mV\n55.25 ms,0 mV\n", {},
     ),
+    "units below the names, and others that are none of these": ("ISI,MEP,HR\nms,mV,bpm\n", ",", {}),
     "units as words": ("ISI milliseconds,MEP_in_millivolts\n", ",", {}),
     "a title and comments above": ("Paired pulses: ISI, MEP\n# of 2024\n\nisi_ms,mep_mv\n", ",", {}),
     "what Excel writes about the separator": ("sep=;\nisi_ms;mep_mv\n", ";", {}),

@@ -17,6 +17,7 @@ from typing import Any, Final
 from isiw.errors import InvalidValueError
 from isiw.existing.layout import ISI_UNITS_MS, WORDS, Layout, plain, unit_named
 from isiw.lazy import pd
+from isiw.types import FloatArray
 
 _NUMBER: Final = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
 _GROUPED: Final = {".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),  # by the other sign than the decimal one
@@ -121,6 +122,12 @@ class Column:
     def texts(self) -> list[str]:
         """The cells of all rows as texts."""
         return [self.text(row) for row in range(len(self.cells))]
+
+    @cached_property
+    def numbers(self) -> FloatArray:
+        """The cells of all rows as numbers as they stand there, shape (n,); NaN for what is none."""
+        texts = pd.Series([text.replace(",", ".") for text in self.texts], dtype=object)
+        return pd.to_numeric(texts, errors="coerce").to_numpy(dtype="float64")
 
     def refused(self, row: int, why: str, remedy: str) -> InvalidValueError:
         """The error that a cell of a row cannot be read."""

@@ -1,4 +1,4 @@
-"""What the numbers of a table say themselves: codes, marks, two units, rows that come twice, and no amplitudes."""
+"""What the numbers of a table say themselves: codes, marks, two units, columns and rows that come twice."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import LONGEST_ISI_MS
 from isiw.existing.doubts import ALL
+from isiw.existing.layout import letters
 from isiw.findings import AMPLITUDE_MV
 
 if TYPE_CHECKING:
@@ -19,11 +20,18 @@ if TYPE_CHECKING:
 
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
 _FEW, _FEWEST = 3, 12  # in a table with fewer rows ISIs may come again by chance
+_NEAR_MS, _ALIKE = (1.0, 25.0), 0.98  # so far from each other are ISIs that were asked and measured, and so alike
 
 
 def require_plain_numbers(columns: Columns) -> None:
     """Raise if the numbers of ISIs and amplitudes seem to be something else, in two units, or of each row twice."""
-    for doubt in (_require_isis, _require_one_unit, _require_one_row_each):
+    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each):
+        doubt(columns)
+
+
+def require_plain_isis(columns: Columns) -> None:
+    """The same of ISIs, whether amplitudes or sweeps are beside them."""
+    for doubt in (_require_isis, _require_no_codes, _require_one_column_each):
         doubt(columns)
 
 
@@ -39,17 +47,13 @@ def _require_isis(columns: Columns) -> None:
         raise InvalidValueError(what, got=f"{len(before)} of {len(paired)}", remedy=remedy)
     if columns.layout.alone is not None or len(paired) < len(columns.rows):
         return
-    numbered = any(isis_ms == list(range(first, first + len(paired))) for first in (0, 1))
-    if "order" not in columns.of and len(paired) >= _FEWEST and numbered:
-        what = f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows"
-        remedy = "Name that of the ISIs: --column isi=NAME; if these are, number the rows in a column called trial."
-        raise InvalidValueError(what, remedy=remedy)
     times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
     for odd in {min(times, default=0.0), max(times, default=0.0)}:
         others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}
         if times[odd] < 3 or len(others) < 2:
             continue
-        frequent = odd <= 0 and (times[odd] >= 2 * max(others.values()) or _is_named(columns, odd))
+        apart = odd <= 0 or odd > 2 * max(others)
+        frequent = apart and (times[odd] >= 2 * max(others.values()) or _is_named(columns, odd))
         if frequent or odd in {-1, -9, -99, -999, 99, 999} or odd > max(499.0, 2 * max(others)):
             what = f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone"
             remedy = f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never."
@@ -57,14 +61,49 @@ def _require_isis(columns: Columns) -> None:
 
 
 def _is_named(columns: Columns, isi_ms: float) -> bool:
-    """True if a column that is not used has a word for the rows with one ISI that no other row has."""
+    """True if a column has a word or two, or one of two numbers, for the rows with one ISI that no other row has."""
     of_isi = {row for row in columns.rows if columns["isi"].number(row) == isi_ms}
-    for column in columns.beside.values():
+    for column in (*columns.beside.values(), columns["block"]):
         words = {column.text(row) for row in of_isi}
         others = {column.text(row) for row in {*columns.rows} - of_isi}
-        if len(words) == 1 and words.isdisjoint(others) and not next(iter(words)).isdigit():
+        is_kind = len(words | others) == 2 or not any(map(str.isdigit, words))
+        if 2 * len(words) <= len(of_isi) and words.isdisjoint(others) and is_kind:
             return True
     return False
+
+
+def _require_no_codes(columns: Columns) -> None:
+    """Raise if ISIs or amplitudes are 1, 2, 3 and so on, or amplitudes one or two numbers, such as yes and no."""
+    for key, rows in (("isi", columns.paired), ("mep", columns.rows)):
+        column, numbers = columns[key], columns[key].numbers[rows]
+        numbers = numbers[np.isfinite(numbers)]
+        kinds = np.unique(numbers).tolist()
+        counts = len(kinds) > 2 and kinds in ([*range(len(kinds))], [*range(1, len(kinds) + 1)])
+        are_codes = counts and ("order" not in columns.of or len(numbers) >= 2 * len(kinds))  # or numbers of rows
+        are_codes |= key == "mep" and len(kinds) < 3 and kinds != [0.0]
+        if are_codes and len(numbers) >= _FEWEST and column.name not in columns.layout.where:
+            remedy = "Write what they stand for, or name the column of the numbers themselves: --column "
+            remedy += f'{key}=NAME; if these are, say --where "{column.name}={ALL}".'
+            raise column.doubted("seems to have codes", ", ".join(f"{kind:g}" for kind in kinds[:5]), remedy)
+
+
+def _require_one_column_each(columns: Columns) -> None:
+    """Raise if an unused column has nearly the same ISIs, or further ones beside them, such as isi2 beside mep2."""
+    isi, mep, rows = columns["isi"], columns["mep"], columns.paired
+    isis, once = isi.numbers[rows], len({isi.text(row) for row in rows}) == len(rows)
+    stems = {name: letters(name).rstrip("0123456789") for name in (isi.name, mep.name, *columns.beside)}
+    a_row_each = once and list(stems.values()).count(stems[mep.name]) > 2  # or else MEP2 is that of another muscle
+    alike = [isi.name, *([mep.name] if a_row_each and mep.name else [])]
+    is_stated = bool(columns.layout.columns.keys() & {"isi", "asked"}) or "asked" in columns.of
+    for name, column in columns.beside.items() if len({*isis.tolist()}) > _FEW else ():
+        others = column.numbers[rows]
+        off_ms = abs(isi.factor * float(np.median(others - isis)))
+        is_near = _NEAR_MS[0] < off_ms < _NEAR_MS[1] and np.ptp(others) > 0 and np.corrcoef(isis, others)[0, 1] > _ALIKE
+        is_further = stems[name] in map(stems.get, alike) and np.isfinite(others).any()
+        if name not in columns.layout.where and (is_further or (is_near and not is_stated)):
+            remedy = "If they are further trials, write a row for each; if both are of the same trials, say --column "
+            remedy += f'isi=NAME with the ISIs that were measured; if it is something else, say --where "{name}={ALL}".'
+            raise column.doubted(f"is like {' or '.join(alike)}, and is not read", None, remedy)
 
 
 def _require_one_unit(columns: Columns) -> None:

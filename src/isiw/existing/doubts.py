@@ -47,7 +47,8 @@ _RELATIVE: Final = re.compile(
 )
 _MEASURES: Final = (
     r"\b(bas[ei]|zero|0|onset|null)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b|\b[aá]rea\b|\baire\b|fläche|"
-    r"\bauc\b|\brms\b|integra|rectif|latenc"
+    r"\bauc\b|\brms\b|integra|rectif|latenc|"
+    r"^(?!.*(peak\W*(to|2)?\W*peak|\bp\W?(2|to|t)?\W?p\b|max\w*\W+(to\W+)?min)).*\b(trough|max|maximum|min|minimum)\b"
 )
 _OTHERWISE: Final = (
     ("mep", _RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
@@ -80,7 +81,7 @@ def require_of_kind(key: str, what: str, name: str, source: str) -> None:
     for of, pattern, are, expected in _OTHERWISE:
         if of == key and (found := re.search(pattern, _words(name))):
             what = f"the {what} of {source} in the column {name!r} {are}"
-            remedy = f"Name the column that holds these: --column {key}=NAME."
+            remedy = f"Name the column that holds these: --column {key}=NAME; if it is this one, correct its name."
             raise InvalidValueError(what, got=found[0].strip(), expected=expected, remedy=remedy)
 
 
@@ -154,8 +155,7 @@ def require_no_summaries(columns: Columns, apart: int | None) -> None:
     isi, mep = columns["isi"], columns["mep"]
     numbers = {row: number for row in columns.rows if (number := mep.number(row)) is not None}
     known, meps = [*numbers], np.array([*numbers.values()]) / mep.factor
-    texts = [isi.texts[row].replace(isi.decimal, ".") for row in known]
-    isis = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce").to_numpy(dtype=np.float64)
+    isis = isi.numbers[known]
     digits = [len(mep.texts[row].partition(mep.decimal)[2]) for row in known]
     below = next((n for n, row in enumerate(known) if apart is not None and row >= apart), len(known))
     for begin in sorted(
@@ -228,6 +228,17 @@ def require_codes(columns: Columns) -> None:
         raise subject.refused(empty[0], "is empty", "Write the person's code into each row.")
 
 
+def require_no_parts(columns: Columns, empty: Iterable[int]) -> None:
+    """Raise if a row between trials has a word and no numbers, as a title has of the rows below it."""
+    every = [*columns.of.values(), *columns.beside.values()]
+    for row in (row for row in empty if columns.rows[0] < row < columns.rows[-1]):
+        said = [column for column in every if column.texts[row]]
+        of_trials = {said[0].texts[one] for one in columns.rows} - {""} if len(said) == 1 else {"more"}
+        if all(map(_NUMBER.fullmatch, of_trials)) and not _NUMBER.fullmatch(said[0].texts[row]):
+            remedy = "If what is below is of another muscle, person or block, write that into a column of each row; if "
+            raise said[0].refused(row, "has a word and no trial, as a title has", f"{remedy}not, delete the row.")
+
+
 def _require_ascending(columns: Columns) -> None:
     """Raise if rows are not in the order of delivery, on which drift and the start depend, or a block comes back."""
     block, seen = columns["block"], set[str]()
@@ -248,7 +259,8 @@ def _require_ascending(columns: Columns) -> None:
     in_blocks = [[*each] for _, each in groupby(pairs, itemgetter(0))]
     if any(each != sorted(each) for each in in_blocks):
         what = f"the rows of {order.of} are not in the order of its column {order.name!r}"
-        remedy = "Sort them as the trials were delivered, or name the column that says so: --column order=NAME."
+        remedy = "Sort them as the trials were delivered, or name the column that says so: --column order=NAME; if it "
+        remedy += "begins again, as at midnight or with each block, add a column called date or block that says so."
         raise InvalidValueError(what, remedy=remedy)
     twice = [place for each in in_blocks for (_, before), (_, place) in pairwise(each) if before == place]
     if "order" in columns.of and not odd and twice:
@@ -266,6 +278,13 @@ def require_said(columns: Columns) -> None:
         if (by := columns.called_alone(row)) is not None and not (by is condition and one_word):
             remedy = "If it is TMS alone, leave its ISI empty, or say --alone with it; if a pair, rename the column."
             raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
+    of_alone = {isi.text(row) for row in {*columns.rows} - {*paired}} - {""}
+    unsaid = [row for row in paired if not condition.text(row) and isi.text(row) in of_alone]
+    if unsaid and condition.name:  # such as a word that stands in the first row of each block alone
+        remedy = (
+            f"Write into each row what it is; if all rows with it are TMS alone, say --alone {isi.text(unsaid[0])}."
+        )
+        raise condition.refused(unsaid[0], "is empty, and the ISI there is that of TMS alone", remedy)
     said = [columns["status"].flag(row) for row in columns.rows if "status" in columns.of]
     if {*said} == {None, True}:
         row = columns.rows[said.index(None)]
@@ -289,7 +308,7 @@ def _require_one_kind(columns: Columns) -> None:
         kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
         if name in columns.layout.where or len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
             continue
-        if not are_words and len(kinds) > len(by_isi) / _ROWS_A_NUMBER:
+        if not are_words and (len(kinds) > len(by_isi) / _ROWS_A_NUMBER or _counts_again(column, by_isi)):
             continue
         usual = min(kinds.values()) if are_words else len(texts) / len(kinds)
         size = min(math.ceil(4 * len(texts) / usual), len(texts) // 2)
@@ -300,6 +319,15 @@ def _require_one_kind(columns: Columns) -> None:
             remedy = f'Say --where "{name}={next(iter(kinds))}" for one of them, --where "{name}={ALL}" if all are to '
             remedy += f'be analysed together, or --column "subject={name}" if they are people.'
             raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
+
+
+def _counts_again(column: Column, by_isi: Sequence[tuple[float, int]]) -> bool:
+    """True if a column counts each ISI's repetitions, in an order of ISIs in which people or muscles have no rows."""
+    each = [[column.text(row) for _, row in rows] for _, rows in groupby(by_isi, itemgetter(0))]
+    if not all(texts == [str(n) for n in range(1, len(texts) + 1)] for texts in each):
+        return False
+    numbers = [int(column.text(row)) for row in sorted(row for _, row in by_isi)]
+    return any(after not in {before, before + 1, 1} for before, after in pairwise(numbers))
 
 
 def _require_one_intensity(columns: Columns) -> None:

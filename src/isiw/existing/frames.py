@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import chain, islice, pairwise, zip_longest
 from pathlib import Path
@@ -148,7 +148,8 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     body = rows if layout.names else rows[1:]
     below = body[0] if body and not layout.names else ()
     units = [unit_named(str(cell).strip().strip("[]()")) for cell in below]
-    if any(units) and all(unit or is_missing(cell) for unit, cell in zip(units, below, strict=True)):
+    others = [str(cell) for unit, cell in zip(units, below, strict=True) if not (unit or is_missing(cell))]
+    if any(units) and (not others or (sum(map(bool, units)) > 1 and not re.search(r"\d", "".join(others)))):
         names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
         body = body[1:]
     if not body:
@@ -224,7 +225,9 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         raise InvalidValueError(what, got="; ".join(f"{name} ({cells})" for name, cells in held.items()), remedy=remedy)
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
-    merged = _require_whole(book.book, chosen, heads[chosen])
+    merged, coloured = _require_whole(book.book, chosen, heads[chosen])
+    if not layout.names:
+        _flag_coloured(rows, coloured)
     _fill_merged(rows, merged, heads[chosen] + (1 if layout.names else 0), layout, chosen)
     for cells in islice(book.book[chosen].iter_rows(), _LINES) if rows else ():
         shown = [_shown_in(cell.number_format) if isinstance(cell.value, int | float) else "" for cell in cells]
@@ -233,6 +236,20 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
             rows[0] = [f"{name} ({unit})" if unit else name for name, unit in pairs]
             break
     return _table(rows, layout, chosen)
+
+
+def _flag_coloured(rows: list[list[Any]], coloured: Iterable[int]) -> None:
+    """Add a column of flags if a few rows have a colour of their own, of which no other column is the reason."""
+    marked = {n for n in coloured if n < len(rows) and not all(map(is_missing, rows[n]))}
+    if not 0 < 4 * len(marked) < len(rows):
+        return
+    for cells in zip(*rows, strict=True):
+        kinds = {str(cells[n]) for n in marked}
+        others = {str(cells[n]) for n in range(1, len(rows)) if n not in marked}
+        if len(kinds) == 1 and kinds.isdisjoint(others) and (len(marked) > 1 or len(others) == 1):
+            return
+    for n, row in enumerate(rows):
+        row.append("flag by colour" if n == 0 else "1" if n in marked else "")
 
 
 def _fill_merged(rows: list[list[Any]], spans: Iterable[str], row_of_first: int, layout: Layout, sheet: str) -> None:
@@ -251,22 +268,36 @@ def _fill_merged(rows: list[list[Any]], spans: Iterable[str], row_of_first: int,
             row[column] = rows[first][column]
 
 
-def _require_whole(book: Any, sheet: str, head: int) -> list[str]:
-    """Which cells are merged; raise if Excel shows rows below the head of a sheet otherwise than they are read."""
+def _require_whole(book: Any, sheet: str, head: int) -> tuple[list[str], list[int]]:
+    """Which cells are merged, and which rows below a head are coloured; raise if Excel shows some not as they are."""
     with book[sheet]._get_source() as file:  # noqa: SLF001 - openpyxl does not read it in another way, row by row
         content = file.read()
     notes = (book._archive.read(name) for name in book._archive.namelist() if "comment" in name)  # noqa: SLF001 - the same
     content = b"".join([content, *notes])
-    fonts = {n for n, font in enumerate(book._fonts) if font.strike}  # noqa: SLF001 - the same
-    styles = [str(n) for n, style in enumerate(book._cell_styles) if style.fontId in fonts]  # noqa: SLF001 - the same
-    crossed = rf'<c r="[A-Z]+(\d+)" s="(?:{"|".join(styles)})"[^>/]*>' if styles else "(?!)"
+    crossed, coloured = _styled(book, lambda font, _: font.strike), _styled(book, _is_coloured)
     for pattern, are, remedy in (*_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT)):
         found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
         if rows := [str(row) for row in sorted(found) if row > head]:
             what = f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}"
             got = f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}"
             raise InvalidValueError(what, got=got, remedy=remedy)
-    return [span.decode() for span in re.findall(rb'<mergeCell ref="([A-Z0-9:]+)"', content)]
+    spans = [span.decode() for span in re.findall(rb'<mergeCell ref="([A-Z0-9:]+)"', content)]
+    return spans, [row - head for row in map(int, re.findall(coloured.encode(), content)) if row > head]
+
+
+def _styled(book: Any, are_so: Callable[[Any, Any], bool]) -> str:
+    """What finds the numbers of rows in the XML of a sheet that have a cell whose font and fill are so."""
+    fonts, fills = book._fonts, book._fills  # noqa: SLF001 - openpyxl does not say it in another way, row by row
+    styles = [str(n) for n, one in enumerate(book._cell_styles) if are_so(fonts[one.fontId], fills[one.fillId])]  # noqa: SLF001 - the same
+    return rf'<c r="[A-Z]+(\d+)" s="(?:{"|".join(styles)})"[^>/]*>' if styles else "(?!)"
+
+
+def _is_coloured(font: Any, fill: Any) -> bool:
+    """True if a cell is not black on white."""
+    usual = {"000000", "FFFFFF", 0, 1}  # as numbers those of a theme
+    shown = [font.color, fill.fgColor if fill.fill_type == "solid" else None]
+    known = [one for one in shown if one is not None and one.type in {"rgb", "theme"}]
+    return not usual.issuperset(one.value if one.type == "theme" else one.value[-6:] for one in known)
 
 
 def _shown_in(number_format: str) -> str:
@@ -305,7 +336,8 @@ def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
 def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
     """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
     squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
-    vectors = {name: array for name, array in squeezed.items() if array.ndim == 1}
+    vectors = {name: array for name, array in squeezed.items()  # but not a cell's arrays, such as one for each ISI
+               if array.ndim == 1 and not any(isinstance(one, np.ndarray) for one in array)}  # fmt: skip
     texts = {name: str(array.item()) for name, array in arrays.items() if array.size == 1 and array.dtype.kind in "UO"}
     of_isis = {name for name in vectors if name == layout.columns.get("isi") or letters(name) in COLUMNS["isi"]}
     longest = max((len(vectors[name]) for name in of_isis or vectors), default=0)

@@ -18,6 +18,7 @@ from isiw.types import FloatArray
 
 _TWICE_S: Final = 3e-3  # a trigger that is found twice within so short a time is one, which came at the first edge
 _SAME_PULSE_S: Final = 20e-3  # an event of a pulse alone marks the pulse that is marked within so short a time
+_OF_NONE: Final = re.compile("(?i)bad|sweep$|edge|.*boundary|.*new segment")  # events of no stimuli
 _EARLY_S: Final = 20e-3  # a pulse at most so long before a tap was meant to follow it, and is TMS before the impact
 
 
@@ -63,6 +64,15 @@ def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
     number = re.sub(r"\D", "", stated)  # of which MNE may keep no more
     fits = ([stated], [name for name in names if _plain(name) == _plain(stated)], [number])
     return next((each for each in fits if each and {*each} <= {*names}), [])
+
+
+def note_of_others(events: pd.DataFrame, layout: Layout) -> tuple[str, ...]:
+    """A sentence about the events of which nothing is read, if there are any."""
+    used = {name for key in MARKS for name in _fitting(events, key, layout)}
+    others = [name for name in names_of(events) if name not in used and not _OF_NONE.match(name)]
+    found = ", ".join(f"{name!r} ({len(times_of(events, name))})" for name in others[:5])
+    more = f" and {counted(len(others) - 5, 'other')}" if len(others) > 5 else ""
+    return (f"Nothing is read of the events {found}{more}. Do some mark stimuli?",) if others else ()
 
 
 def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str | None:

@@ -160,6 +160,7 @@ def _people_of(
     columns = replace(columns, rows=[n for n in columns.rows if n not in empty])
     if not columns.rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
+    doubts.require_no_parts(columns, empty)
     doubts.require_codes(columns)
     dates = dates_of(columns["date"], columns.rows)
     people = _by_text(map(columns["subject"].text, columns.rows), columns.rows)

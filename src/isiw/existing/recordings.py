@@ -13,12 +13,13 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing, required_unit
 from isiw.existing.delivered import Delivered, anywhere, renumbered
+from isiw.existing.doubtful_numbers import require_plain_isis
 from isiw.existing.doubts import is_rectified, require_said
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
 from isiw.existing.layout import EMG_UNITS, MARKERS, Layout, unit_named
-from isiw.existing.markers import Pulse, marked, names_of, pulses_of
+from isiw.existing.markers import Pulse, marked, names_of, note_of_others, pulses_of
 from isiw.existing.quantities import Columns, isis_of, require_one, unit_said
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -50,6 +51,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     reference, unused, person = layout.required_reference(source), tuple[str, ...](), ""
     if contents.trials is None or contents.pulse_at_s is None:
         pulses = pulses_of(contents.events, key, layout, source)
+        contents = replace(contents, notes=(*contents.notes, *note_of_others(contents.events, layout)))
     else:
         pulses, unused, person = _pulses_of_rows(contents, signals["emg"], layout)
     if any(after.at_s - before.at_s < _AFTER_S for before, after in pairwise(pulses)):
@@ -82,7 +84,8 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         raise InvalidValueError(f"no sweep of {source} counts", got=got, remedy=remedy)
     if layout.mep_window_ms is None and any(trial.isi_ms is not None for trial in trials):
         _require_within(seen, limits, source)
-    emg = [channels["emg"].values for channels in sweeps.values() if "emg" in channels]
+    apart = ((one.channels["emg"].values, _since_pulse_ms(one)) for one, _ in seen)  # from the artefact of the pulse
+    emg = [values[(since_ms < -1) | (since_ms >= limits.mep_window_ms[0])] for values, since_ms in apart]
     return Delivered(
         renumbered(trials),
         reference,
@@ -100,8 +103,7 @@ def _require_within(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, s
     """Raise if most responses are not where MEPs are measured, or go on beyond an edge of it, or if there are none."""
     (first_ms, last_ms), responses_ms, usual = limits.mep_window_ms, list[float | None](), False
     for sweep, trial in seen:
-        shown, emg = shown_by(sweep, trial, limits), sweep.channels["emg"]
-        since_ms = np.arange(len(emg.values)) * (1e3 / emg.rate_hz) + emg.t0_ms - (sweep.t_tms_ms or 0.0)
+        shown, emg, since_ms = shown_by(sweep, trial, limits), sweep.channels["emg"], _since_pulse_ms(sweep)
         within = np.abs(emg.values - np.median(emg.values))[(since_ms >= first_ms) & (since_ms <= last_ms)]
         if shown.outside is not None:
             responses_ms.append(shown.outside.at_ms)
@@ -116,6 +118,12 @@ def _require_within(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, s
         remedy = "Does its marker, or time 0, come at the pulse? If so, write the muscle's "
         remedy += "mep_window_ms = [FIRST, LAST] into a layout."
         raise InvalidValueError(f"{what}measured", got=got, remedy=remedy)
+
+
+def _since_pulse_ms(sweep: Sweep) -> FloatArray:
+    """When each sample of the EMG was taken, after the pulse [ms]."""
+    emg = sweep.channels["emg"]
+    return np.arange(len(emg.values), dtype=np.float64) * (1e3 / emg.rate_hz) + emg.t0_ms - (sweep.t_tms_ms or 0.0)
 
 
 def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[str, Track], str]:
@@ -160,6 +168,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
         raise InvalidValueError(what, got=f"{len(trials)} rows and {len(emg.stretches)} sweeps")
     columns = Columns.found(trials, stated, contents.source, needed=("isi",))
     require_said(columns)
+    require_plain_isis(columns)
     marks = {key: marked(contents.events, key, layout) for key in (origin_key(layout), "pulse", "alone")}
     pulses = list[Pulse]()
     for row in columns.rows:

@@ -23,6 +23,7 @@ _ROWS: Final = 2**20  # of a file beside a recording; without a number pandas op
 _SAME: Final = 1.5  # so many samples apart a code and an event of one name are one event
 _GAP_S: Final = 2.5e-3  # samples that are later than expected by so much, for good, come after a gap; others jitter
 _AROUND_S: Final = 1.0
+_SHORT, _LEVEL = 2, 0.7  # a level that lasts longer [samples] is so near to the highest or lowest one of a trigger
 _ENOUGH_S: Final = 10.0  # a stretch that is longer says at which rate its samples were really taken
 _SCATTER_S: Final = 2e-3  # times that scatter more are said
 
@@ -163,13 +164,20 @@ class Track:
         """When a trigger leaves the level at which it mostly is [s]; raise if it is as long at the other one."""
         ends = [(values.min(), values.max()) for _, values, _ in self.pieces()]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2 if ends else 0.0
-        rises, falls, high = list[float](), list[float](), 0
+        rises, falls, high, tops = list[float](), list[float](), 0, list[float]()
         for at_s, values, before in self.pieces():
             above = values > middle
             high += int(above.sum())
             turns = np.diff(above.astype(np.int8), prepend=np.int8(before > middle))
             rises += (at_s + np.flatnonzero(turns > 0) / self.rate_hz).tolist()
             falls += (at_s + np.flatnonzero(turns < 0) / self.rate_hz).tolist()
+            if (edges := np.flatnonzero(turns)).size:
+                lasts = np.diff([*edges, len(values)])
+                tops += np.maximum.reduceat(np.abs(values - middle), edges)[lasts > _SHORT].tolist()
+        if tops and np.quantile(tops, 0.25) < _LEVEL * (max(high for _, high in ends) - middle):
+            what = f"the trigger {self.name!r} has more than two levels, as a wave of force or acceleration has"
+            remedy = "Export events in its place that say when it begins, or a trigger of two levels."
+            raise InvalidValueError(what, remedy=remedy)
         spans_s = np.diff(sorted([*rises, *falls]))
         if len(spans_s) > 2 and 0.5 < np.median(spans_s[0::2]) / np.median(spans_s[1::2]) < 2:
             what = f"the trigger {self.name!r} is as long at one level as at the other: which of its edges are stimuli?"
