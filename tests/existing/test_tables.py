@@ -49,6 +49,11 @@ def test_a_data_frame_is_read_as_it_is() -> None:
     assert trials_of(read_people(frame(), IMPACT)) == list(zip(ISIS, MEPS, strict=True))
 
 
+def test_microvolts_become_the_nearest_millivolts() -> None:
+    table = pd.DataFrame({"isi_ms": ISIS, "mep_uv": [10.4, 20.9, 35.7, 120.3, 1.1]})
+    assert [mep_mv for _, mep_mv in trials_of(read_people(table, IMPACT))] == [0.0104, 0.0209, 0.0357, 0.1203, 0.0011]
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252"])
 def test_a_decimal_comma_and_any_encoding_are_read(encoding: str, tmp_path: Path) -> None:
     frame("ISI (ms)", "MEP [µV]", 1000.0).to_csv(

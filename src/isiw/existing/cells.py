@@ -97,7 +97,8 @@ class Column:
             is_comma = isinstance(cell, str) and "," in cell and self.decimal != ","
             remedy = "If the comma is a decimal sign, say --decimal ," if is_comma else self.remedy
             raise self.refused(row, "is no number", remedy)
-        return value if self.factor == 1.0 else value * self.factor
+        # 10.4 µV are 0.0104 mV, not 0.010400000000000001.
+        return value if self.factor == 1.0 else float(f"{value * self.factor:.15g}")
 
     def flag(self, row: int, yes: str = "counted", no: str = "left out") -> bool | None:
         """True if the cell of a row says yes, or a word of that kind; None if it is empty."""
