@@ -3,9 +3,9 @@
 #
 # Expected: OneSampleTTest takes the sample's mean, standard deviation and size: t = (mean - population mean) / (SD / root of n),
 #   as every textbook has it, and Cohen's d of a t score is t / root of n.
-# Seen: both use the root of the degrees of freedom. With 5 persons t is 2.51 for 2.81; the t of 2.81 given as a score has a
-#   d of 1.40, the mean and SD it was made of one of 1.26. (It would be right for an SD with divisor n, which no statistics program gives by
-#   itself; the readme's examples use plain SDs.)
+# Seen: both use the root of the degrees of freedom. With 5 persons t is 2.51 for 2.81; the t of 2.81 given as a score has
+#   a d of 1.40, the mean and SD it was made of one of 1.26. (It would be right for an SD with divisor n; nothing asks for
+#   one.)
 # Hurts: small samples, usual in stimulation studies: p values that are too large, d and Hedges' g from published t values
 #   that are too large, by 7 % with 8 persons and by 12 % with 5.
 set -euo pipefail
