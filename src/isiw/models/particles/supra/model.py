@@ -61,14 +61,7 @@ class SupraPosterior(SwarmPosterior[SupraModel]):
     @cached_property
     def sample(self) -> SupraSample:
         """The particles that represent all of them where every candidate ISI is scored."""
-        return self._sample(self.model.thinned, self.trials)
-
-    @cached_property
-    def _all(self) -> SupraSample:
-        return self._sample(self.model.particles, 0)
-
-    def _sample(self, size: int, order: int) -> SupraSample:
-        return SupraSample(self.swarm.picked(self.law, size)[1], self.space, order)
+        return SupraSample(self.swarm.picked(self.law, self.model.thinned)[1], self.space, self.trials)
 
     def depressed_masks(self, isi_ms: Array) -> Singles:
         """Sampled depressed segments; see `SamplesDepression`."""
@@ -76,15 +69,13 @@ class SupraPosterior(SwarmPosterior[SupraModel]):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, and the segment in which the tap depresses the MEP."""
-        grid = grid_of(self.space)
 
         def profiles() -> SampledProfiles:
             mep_mv = self.sample.expected_mep_mv(profile_grid(self.space))
             return SampledProfiles(mep_mv[person], self.baselines_mv()[person])
 
-        enhanced, depressed = (
-            Runs.of_masks(masks(grid)[person]) for masks in (self._all.window_masks, self._all.depressed_masks)
-        )
+        own = SupraSample(self.swarm.picked(self.law, self.model.particles, person)[1], self.space, 0)
+        enhanced, depressed = (Runs.of_masks(masks[0]) for masks in own.masks(grid_of(self.space)))
         estimate = sampled_estimate(enhanced, profiles, self.space)
         probability = len(depressed.found) / len(depressed.pairs)
         segment = Window.from_mask(self.space.grid_ms, depressed.best[0]) if probability >= 0.5 else None

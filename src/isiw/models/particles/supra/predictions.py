@@ -37,14 +37,20 @@ class SupraSample(TabledSample):
         excess_mv = self.expected_mep_mv(range_ms) - self._baseline_mv
         return excess_mv.max(-1, keepdims=True), -excess_mv.min(-1, keepdims=True)
 
+    def masks(self, isi_ms: Singles) -> tuple[Singles, Singles]:
+        """Sampled windows, and depressed segments by the window's rule for the deficit, as 0 or 1, shape (b, s, t)."""
+        excess_mv = self.expected_mep_mv(isi_ms) - self._baseline_mv
+        largest_mv, deepest_mv = self._extremes_mv
+        depressed = self._masks(-excess_mv, deepest_mv) * (self._baseline_mv >= LEAST_DEPRESSED_MV)
+        return self._masks(excess_mv, largest_mv), depressed
+
     def window_masks(self, isi_ms: Singles) -> Singles:
-        """Sampled windows as 0 or 1, shape (b, s, t)."""
-        return self._masks(self.expected_mep_mv(isi_ms) - self._baseline_mv, self._extremes_mv[0])
+        """Sampled windows alone."""
+        return self.masks(isi_ms)[0]
 
     def depressed_masks(self, isi_ms: Singles) -> Singles:
-        """Sampled depressed segments as 0 or 1, by the window's rule for the deficit, shape (b, s, t)."""
-        masks = self._masks(self._baseline_mv - self.expected_mep_mv(isi_ms), self._extremes_mv[1])
-        return masks * (self._baseline_mv >= LEAST_DEPRESSED_MV)
+        """Sampled depressed segments alone."""
+        return self.masks(isi_ms)[1]
 
     def _masks(self, excess_mv: Array, largest_mv: Array) -> Singles:
         return (excess_mv >= least_excess_mv(largest_mv, self._baseline_mv)).astype(np.float32)
