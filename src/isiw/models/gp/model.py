@@ -355,13 +355,17 @@ class GaussianProcessPosterior(OfAmplitudes):
         found = self.fits[person]
         return found.regression(torch.tensor(found.best))
 
+    @cached_property
+    def _windows(self) -> Singles:
+        """Sampled windows of all people on the space's grid, (b, s, t)."""
+        return self.window_masks(grid_of(self.space))
+
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        grid = grid_of(self.space)
 
         def profiles() -> SampledProfiles:
             mep_mv = self.profiles_mv(profile_grid(self.space))
             return SampledProfiles(mep_mv[person], self.baselines_mv()[person])
 
-        windows = Runs.of_masks(self.window_masks(grid)[person])
+        windows = Runs.of_masks(self._windows[person])
         return sampled_estimate(windows, profiles, self.space, most_probable=MOST_PROBABLE)

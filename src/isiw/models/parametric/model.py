@@ -251,12 +251,16 @@ class ParametricPosterior:
         """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
         return self.drawn.evidence
 
+    @cached_property
+    def _windows(self) -> Singles:
+        """Sampled windows of all people on the space's grid, (b, s, t)."""
+        return self.window_masks(self.space.grid_ms)
+
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        masks = self.window_masks(self.space.grid_ms)[person]
 
         def profiles() -> SampledProfiles:
             mep_mv = self.profiles_mv(profile_grid(self.space))
             return SampledProfiles(mep_mv[person], self.baselines_mv()[person])
 
-        return sampled_estimate(Runs.of_masks(masks), profiles, self.space)
+        return sampled_estimate(Runs.of_masks(self._windows[person]), profiles, self.space)
