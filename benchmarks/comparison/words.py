@@ -218,11 +218,8 @@ def ratio_of(line: Mapping[str, Any], criterion: float) -> str:
     if bound:
         return f"{'<' if bound == 'below' else '>'} {short(ratio)}"
     low, high = line[f"low_{criterion}"], line[f"high_{criterion}"]
-    if math.isnan(low):
-        return f"{short(ratio)} (no interval)"
-    return (
-        f"{short(ratio)} ({short(low)} to {short(high)})" if math.isfinite(high) else f"{short(ratio)} (≥ {short(low)})"
-    )
+    reach = f"{short(low)} to {short(high)}" if math.isfinite(high) else f"≥ {short(low)}"
+    return f"{short(ratio)} ({'no interval' if math.isnan(low) else reach})"
 
 
 def readable(table: pd.DataFrame) -> pd.DataFrame:

@@ -126,7 +126,7 @@ class Column:
 
     @cached_property
     def numbers(self) -> FloatArray:
-        """The cells of all rows as numbers as they stand there, shape (n,); NaN for what is none."""
+        """The cells of all rows as numbers as they stand there, also with commas, shape (n,); NaN for what is none."""
         texts = pd.Series([text.replace(",", ".") for text in self.texts], dtype=object)
         return pd.to_numeric(texts, errors="coerce").to_numpy(dtype="float64")
 

@@ -105,7 +105,7 @@ INLINE int any(Wholes where) {
 INLINE Reals absolute(Reals x) { return most_v(x, -x); }
 
 #if defined(__AVX2__) && !defined(__AVX512F__)
-/* The first of the lanes, so many, as the processor wants them said. */
+/* A mask of the first lanes, so many, for loads and stores of a part of a vector. */
 INLINE __m256i first_lanes(int64_t count) {
     return _mm256_cmpgt_epi32(_mm256_set1_epi32((int)count), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
 }

@@ -45,11 +45,11 @@ class SupraSample(TabledSample):
         return self._masks(excess_mv, largest_mv), depressed
 
     def window_masks(self, isi_ms: Singles) -> Singles:
-        """Sampled windows alone."""
+        """Sampled windows alone, shape (b, s, t)."""
         return self.masks(isi_ms)[0]
 
     def depressed_masks(self, isi_ms: Singles) -> Singles:
-        """Sampled depressed segments alone."""
+        """Sampled depressed segments alone, shape (b, s, t)."""
         return self.masks(isi_ms)[1]
 
     def _masks(self, excess_mv: Array, largest_mv: Array) -> Singles:
