@@ -100,11 +100,13 @@ def _climb(log_density: LogDensity, starts: Tensor, steps: int) -> Tensor:
         # Steps of at most two of the prior's SDs.
         step: Tensor = direction / (0.5 * direction.norm(dim=-1, keepdim=True)).clamp_min(1.0)
         tried = points.unsqueeze(1) + direction.new_tensor(STEP_LENGTHS).unsqueeze(-1) * step.unsqueeze(1)
-        with torch.no_grad():
-            reached, best = log_density(tried.flatten(0, 1)).view(len(points), -1).max(-1)
-        better = (reached > values).unsqueeze(-1)
-        moved = torch.where(better, tried[torch.arange(len(points)), best], points)
-        new_values, new_slopes = _gradient(log_density, moved)
+        # The slopes of all lengths at once cost less than those of the best one by themselves.
+        reached, there = _gradient(log_density, tried.flatten(0, 1))
+        best = reached.view(len(points), -1).argmax(-1) + len(STEP_LENGTHS) * torch.arange(len(points))
+        better = (reached[best] > values).unsqueeze(-1)
+        moved = torch.where(better, tried.flatten(0, 1)[best], points)
+        new_values = torch.where(better.squeeze(-1), reached[best], values)
+        new_slopes = torch.where(better, there[best], slopes)
         if float((new_values - values).max()) < SMALL_GAIN_NATS:
             return moved
         # Where no length was better, the next step follows the plain slope.

@@ -214,9 +214,10 @@ def _log_density(parts: _Components, log_mep: Tensor, likelihood: Likelihood) ->
         shape = parts.cv2.reciprocal()
         log_ratio = log_mep - torch.log(parts.mean_mv)
         return shape * (torch.log(shape) + log_ratio - torch.exp(log_ratio)) - torch.lgamma(shape)
+    # What does not depend on the MEP is worked out first, as tables have many MEPs for each mean.
     variance = torch.log1p(parts.cv2)
-    off = log_mep - torch.log(parts.mean_mv) + 0.5 * variance
-    return -0.5 * (off.square() / variance + torch.log(variance)) - _LOG_SQRT_2PI
+    off = (log_mep - (torch.log(parts.mean_mv) - 0.5 * variance)) * torch.rsqrt(variance)
+    return torch.addcmul(-0.5 * torch.log(variance) - _LOG_SQRT_2PI, off, off, value=-0.5)
 
 
 def _normal_score(parts: _Components, log_mep: Tensor, likelihood: Likelihood) -> Tensor:
