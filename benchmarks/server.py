@@ -29,6 +29,7 @@ from benchmarks.server_strangers import operated_meanwhile, served_meanwhile
 from benchmarks.server_tries import Served, fuzzed, killed, tried
 
 SPACE: dict[str, Any] = {"low_ms": 0, "high_ms": 320, "reference": "impact"}
+LIMITS: dict[str, Any] = {"min_iti_s": 0.0, "max_pulses": 600}  # as many as pf plans
 
 
 def mep_mv(isi_ms: float, number: int) -> float:
@@ -58,7 +59,7 @@ class ByHttp:
     def __init__(self, served: Served, session: str, strategy: str, *, kept: bool) -> None:
         self.session, self.kept, self.client = f"/sessions/{session}", kept, served.client()
         self.served = served
-        plan = {"space": SPACE, "seed": 1, "limits": {"min_iti_s": 0.0}, "strategy": {"name": strategy}}
+        plan = {"space": SPACE, "seed": 1, "limits": LIMITS, "strategy": {"name": strategy}}
         self.client.post("/sessions", json={"id": session, **plan}).raise_for_status()
 
     def post(self, verb: str, body: dict[str, float]) -> dict[str, float]:
@@ -104,9 +105,10 @@ def latency(folder: Path, trials: int) -> None:
 
 def _spent_ms(served: Served, folder: Path, name: str, trials: int) -> np.ndarray:
     """How long ask and tell of each trial took, by way; shape (3, trials, 2)."""
-    strategy = isiw.make_strategy(name, isiw.DesignSpace(**SPACE), seed=1)
+    space = isiw.DesignSpace(**SPACE)
+    strategy, limits = isiw.make_strategy(name, space, seed=1), isiw.Limits.of_space(space, **LIMITS)
     spent_ms = np.zeros((len(WAYS), trials, 2))
-    with isiw.open_session(strategy, folder / f"{name}.mcap") as own:
+    with isiw.open_session(strategy, folder / f"{name}.mcap", limits=limits) as own:
         ways = (
             InProcess(own),
             ByHttp(served, f"{name}-kept", name, kept=True),
