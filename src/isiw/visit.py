@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
-from functools import partial
+from functools import lru_cache, partial
 from typing import Annotated
 
 from isiw.checks import Checked, Count, Natural, Positive, Text, number, share
@@ -137,6 +137,7 @@ class VisitProtocol(Checked):
         return exact_share(self.tms_alone) + exact_share(self.tap_alone)
 
 
+@lru_cache(maxsize=16)  # asked for at each of the trials that a session looks ahead to
 def exact_share(share: float) -> Fraction:
     """A share as a fraction, so that no stretch gains or loses a trial by rounding."""
     return Fraction(share).limit_denominator(_FINEST_SHARE)
