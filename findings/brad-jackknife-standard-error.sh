@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # brad's standard error of a jackknife is the bootstrap's: with 25 values a fifth of what it should be.
 #
-# Expected: jackknife returns the statistic without one value at a time, with a method standard_error. The jackknife's standard error is
-#   the root of (n - 1) / n times the sum of squares (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, eq. 11.5);
-#   for the mean it is exactly SD / root of n.
+# Expected: jackknife returns the statistic without one value at a time, with a method standard_error. The jackknife's standard
+#   error is the root of (n - 1) / n times the sum of squares (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, eq.
+#   11.5); for the mean it is exactly SD / root of n.
 # Seen: it returns the object of the bootstrap, whose standard error is the replications' SD: 0.044 for 0.209 with 25 values, a
 #   tenth of it with 100. Its intervals are made with it, too.
 # Hurts: an interval for 95 % holds the true value in less than a third of the samples of 25; every difference is significant.

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # brad's permutation test does not count ties: where p can be no smaller than 0.05 it is 0.
 #
-# Expected: p_value of a permutation test: the share of permutations with a statistic at least as large as the observed one; the observed
-#   order is one of the permutations, so p is never 0. Three against three persons, all higher: 1 of 20 orders, p = 0.05.
+# Expected: p_value of a permutation test: the share of permutations with a statistic at least as large as the observed one; the
+#   observed order is one of the permutations, so p is never 0. Three against three persons, all higher: 1 of 20 orders, p =
+#   0.05.
 # Seen: only larger statistics are counted. p is 0 for every complete separation, and for all groups alike it is 0 too.
 # Hurts: small groups and answers that are whole numbers, so many ties: p is always too small, and 2 against 2 persons are
 #   "significant".

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # EZ2 takes the variance of correct answers for that of errors: from exact moments it finds other drift rates.
 #
-# Expected: help of ez2_2afc: with correct_only=True, the default, the variances are "computed from correct responses only"; given a
-#   model's exact variances and error rates, the method of moments returns that model's parameters. cvrt says that it is
+# Expected: help of ez2_2afc: with correct_only=True, the default, the variances are "computed from correct responses only";
+#   given a model's exact variances and error rates, the method of moments returns that model's parameters. cvrt says that it is
 #   for the bottom boundary (errors) and that the top one needs a - z.
 # Seen: it calls cvrt for the bottom boundary, so the variance of correct times is fitted with that of error times. Given the
 #   variances of the errors, it returns the parameters. With the start in the middle both are the same, and it is right.

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# ezpwr plans groups for a wanted precision with sizes and standard deviations exchanged: 3 and 6 persons where 37 and 74 are needed.
+# ezpwr plans groups for a wanted precision with sizes and deviations exchanged: 3 and 6 persons where 37 and 74 are needed.
 #
-# Expected: mean.independent.ci.solve_size gives the sizes of two groups for which the confidence interval of the difference has the
-#   wanted half width: solve_precision of these sizes is at most that, and with one person less it is more.
-# Seen: if the first group is to be the smaller one (ratio below 1), the function under the root search gets the sizes in the places
-#   of the standard deviations, and these for the sizes. For a precision of 4 with SDs of 10 and a ratio of 0.5 it says 3 and
-#   6, which give 19. For groups of one size, the default, it raises ZeroDivisionError.
+# Expected: mean.independent.ci.solve_size gives the sizes of two groups for which the confidence interval of the difference has
+#   the wanted half width: solve_precision of these sizes is at most that, and with one person less it is more.
+# Seen: if the first group is to be the smaller one (ratio below 1), the function under the root search gets the sizes in the
+#   places of the standard deviations, and these for the sizes. For a precision of 4 with SDs of 10 and a ratio of 0.5 it says 3
+#   and 6, which give 19. For groups of one size, the default, it raises ZeroDivisionError.
 # Hurts: a study of a tenth of the size that it needs; larger SDs ask for fewer persons.
 set -euo pipefail
 tmp=$(mktemp -d)

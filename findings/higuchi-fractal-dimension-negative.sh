@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # higuchi-fractal's dimension of white noise is -1, of a line 0: two terms of Higuchi's formula are missing.
 #
-# Expected: docstring: the Higuchi fractal dimension of a series: D where the curve's length goes with k to the power of -D (Higuchi,
-#   1988): 1 for a line, 1.5 for a random walk, 2 for white noise. k_max is the largest delay.
+# Expected: docstring: the Higuchi fractal dimension of a series: D where the curve's length goes with k to the power of -D
+#   (Higuchi, 1988): 1 for a line, 1.5 for a random walk, 2 for white noise. k_max is the largest delay.
 # Seen: the length is not divided by k the second time, and the slope is given with its sign: the result is 1 - D. The largest
 #   delay is not used.
-# Hurts: the dimension of EEG and EMG; an increase is a decrease, groups come out in the reversed order, and values do not compare
-#   with any other software.
+# Hurts: the dimension of EEG and EMG; an increase is a decrease, groups come out in the reversed order, and values do not
+#   compare with any other software.
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # hrv's threshold filter looks for late beats only: an early one, 350 ms too soon, stays.
 #
-# Expected: docstring of threshold_filter: an interval is that of an ectopic beat if its absolute difference from the median of the
-#   five before it is above the threshold (250 ms by default), and is then replaced by a spline.
+# Expected: docstring of threshold_filter: an interval is that of an ectopic beat if its absolute difference from the median of
+#   the five before it is above the threshold (250 ms by default), and is then replaced by a spline.
 # Seen: the difference is taken with its sign, except for the first five intervals. Of an ectopic beat (an interval too short,
 #   then one too long) the first half stays at any threshold.
 # Hurts: premature beats are the most common artefact of RR series; the pause after one is corrected and the series looks

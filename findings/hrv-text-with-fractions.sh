@@ -3,10 +3,10 @@
 #
 # Expected: read_from_text reads RR intervals in ms from a text file with one column; the parser makes floats and takes a point.
 # Seen: the pattern lets a point stand only after the first digit (0.8125 in seconds is read). Behind it, two or more decimals
-#   become a further interval, a single one is dropped. Five intervals are read as eight; 1000.00 raises ValueError, for an interval
-#   of 0.
-# Hurts: intervals from an ECG sampled at 512 or 1024 Hz, or exported by other programs, have decimals: every false beat makes
-#   a jump of 800 ms, so RMSSD is hundreds of ms, and the times run away.
+#   become a further interval, a single one is dropped. Five intervals are read as eight; 1000.00 raises ValueError, for an
+#   interval of 0.
+# Hurts: intervals from an ECG sampled at 512 or 1024 Hz, or exported by other programs, have decimals: every false beat makes a
+#   jump of 800 ms, so RMSSD is hundreds of ms, and the times run away.
 # (Its import needs a Python before 3.10, or the name that the script puts back; numpy 1.26 one before 3.13.)
 set -euo pipefail
 tmp=$(mktemp -d)

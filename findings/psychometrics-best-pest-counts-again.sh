@@ -4,8 +4,8 @@
 # Expected: Best PEST (Lieberman and Pentland, 1982) gives, after each trial, the most likely threshold by all trials so far. A
 #   likelihood is a product over the trials, so the same trials in another order have the same most likely threshold.
 # Seen: for each trial the level is stored with the numbers of all trials and all right answers so far, at whatever level, and
-#   these are taken for answers at this level. (Hybrid does the same.) Twenty trials at each of three
-#   levels give 15.9 to 21.7 by their order, for 20.4.
+#   these are taken for answers at this level. (Hybrid does the same.) Twenty trials at each of three levels give 15.9 to 21.7
+#   by their order, for 20.4.
 # Hurts: thresholds of adaptive sessions: the levels come in an order that follows the answers, and the next level is made of
 #   the wrong estimate; in simulations with a threshold of 20 sessions ended at 15, 17 and 36.
 set -euo pipefail

@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # psychometrics' PEST does not double its steps: the third in one direction is 6 and the fourth 8, whatever they were before.
 #
-# Expected: PEST (Taylor and Creelman, 1967): the second step in one direction is as large as the first, the fourth and each further
-#   one twice the one before (up to a maximum), the third the same or twice. Steps get no smaller before the direction turns.
-# Seen: instead of the step, the number of steps in this direction is doubled. From a first step of 16 right answers lead to steps of
-#   16, 6, 8, 10 and 12, from one of 32 to 32, 6, 8, 10 and 12.
-# Hurts: who begins far from the threshold needs many more trials to get near, and which unit the levels have decides how
-#   many: steps of 6 to 14 in mV or in V.
+# Expected: PEST (Taylor and Creelman, 1967): the second step in one direction is as large as the first, the fourth and each
+#   further one twice the one before (up to a maximum), the third the same or twice. Steps get no smaller before the direction
+#   turns.
+# Seen: instead of the step, the number of steps in this direction is doubled. From a first step of 16 right answers lead to
+#   steps of 16, 6, 8, 10 and 12, from one of 32 to 32, 6, 8, 10 and 12.
+# Hurts: who begins far from the threshold needs many more trials to get near, and which unit the levels have decides how many:
+#   steps of 6 to 14 in mV or in V.
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

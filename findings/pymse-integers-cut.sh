@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # pymse cuts the averages of a series of integers: the same numbers have another multiscale entropy as floats.
 #
-# Expected: its description: multiscale entropy (Costa et al., 2002): a series is averaged over windows of the scale, and the sample
-#   entropy of the averages is taken. Whether 800 ms are stored as 800 or 800.0 does not matter.
+# Expected: its description: multiscale entropy (Costa et al., 2002): a series is averaged over windows of the scale, and the
+#   sample entropy of the averages is taken. Whether 800 ms are stored as 800 or 800.0 does not matter.
 # Seen: averages are put into a copy of the data, so of integers they are integers, cut after each division. The entropy is 1.44
 #   for 1.26 at a scale of 2, 0.93 for 1.04 at one of 10.
-# Hurts: RR intervals in ms and raw values of an EMG or EEG recorder are integers; the entropy's course over the scales, which is
-#   what one looks at, is that of a coarser recorder.
+# Hurts: RR intervals in ms and raw values of an EMG or EEG recorder are integers; the entropy's course over the scales, which
+#   is what one looks at, is that of a coarser recorder.
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

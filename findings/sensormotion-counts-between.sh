@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # sensormotion drops minutes whose count lies between two whole numbers at a cut-point: the categories move up by one.
 #
-# Expected: docstring of cut_points: takes the counts of convert_counts and returns a list of categories "for each epoch". Cut-points
-#   (sedentary to 99, light from 100) are for whole counts; convert_counts integrates, so its counts have decimals.
+# Expected: docstring of cut_points: takes the counts of convert_counts and returns a list of categories "for each epoch".
+#   Cut-points (sedentary to 99, light from 100) are for whole counts; convert_counts integrates, so its counts have decimals.
 # Seen: a count of 99.5 is in no category and is left out without a word. Five epochs have four categories, and those behind it
 #   belong to other minutes; the time spent adds up to less.
 # Hurts: activity by the time of day, or beside another signal; which minutes are sedentary is wrong from the first such count.

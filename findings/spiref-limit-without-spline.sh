@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # spiref leaves a spline out of the lower limit of normal: of FEF75 it is up to 12 % off, of FEV1/FVC 1.5 %.
 #
-# Expected: its readme: GLI-2012 reference values; calc_lln_lung_param is the lower limit of normal (5th percentile). The workbook of
-#   GLI-2012 inside the package has, for each age, an M, an S and an L spline, and says for all three that they are added: L is q0 +
-#   q1 ln(age) + Lspline, the limit M (1 - 1.645 L S) to the power of 1 / L.
-# Seen: the columns of M and S are read, that of L is not. It is zero for most, but not for FEV1/FVC of males and FEF75 of females:
-#   these limits are those of another distribution. The predicted values are right.
-# Hurts: FEV1/FVC below its limit is the definition of an airway obstruction: at 85 years 0.586 for 0.591; in girls of three FEF75 is
-#   normal down to 0.51 instead of 0.58 L/s.
+# Expected: its readme: GLI-2012 reference values; calc_lln_lung_param is the lower limit of normal (5th percentile). The
+#   workbook of GLI-2012 inside the package has, for each age, an M, an S and an L spline, and says for all three that they are
+#   added: L is q0 + q1 ln(age) + Lspline, the limit M (1 - 1.645 L S) to the power of 1 / L.
+# Seen: the columns of M and S are read, that of L is not. It is zero for most, but not for FEV1/FVC of males and FEF75 of
+#   females: these limits are those of another distribution. The predicted values are right.
+# Hurts: FEV1/FVC below its limit is the definition of an airway obstruction: at 85 years 0.586 for 0.591; in girls of three
+#   FEF75 is normal down to 0.51 instead of 0.58 L/s.
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
