@@ -4,8 +4,8 @@
 # Expected: docstring: with nan_policy "listwise" "remove the entire rows that contain missing values". Alpha and its interval
 #   are then those of the rows that are left, as if the others had never been there.
 # Seen: the number of persons is taken before they are removed, and gives the degrees of freedom. Alpha is right; of 40 persons
-#   with 20 % of the answers missing 13 are left, and the interval is 0.87 to 0.95 for 0.80 to 0.97.
-# Hurts: the more is missing, the surer the result: a reliability that could be 0.80 is reported as at least 0.87. (The same
+#   with 20 % of the answers missing 11 are left, and the interval is 0.87 to 0.95 for 0.81 to 0.97.
+# Hurts: the more is missing, the surer the result: a reliability that could be 0.81 is reported as at least 0.87. (The same
 #   code is in both.)
 set -euo pipefail
 tmp=$(mktemp -d)
