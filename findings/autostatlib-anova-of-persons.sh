@@ -5,7 +5,7 @@
 #   the conditions differ, with the persons as subjects.
 # Seen: the rows of the table, the conditions, are given as subjects and the columns, the persons, as what is compared. Persons
 #   who differ, in three conditions that are all alike, have p = 0; three conditions far apart, with persons alike, have p =
-#   0.5. The automatic choice takes this test for three or more paired groups that seem normal.
+#   0.6. The automatic choice takes this test for three or more paired groups that seem normal.
 # Hurts: nearly every set of paired data with three conditions is significant, since persons nearly always differ; an effect of
 #   the conditions alone is never found.
 set -euo pipefail
