@@ -327,7 +327,8 @@ def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
         each = list(value) if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim == 1) else []
         inner = value if isinstance(value, dict) else {}
         if each and all(isinstance(one, dict) for one in each):
-            inner = {key: [one.get(key, np.nan) for one in each] for key in each[0]}
+            held = {key: [one.get(key, np.nan) for one in each] for key in each[0]}
+            inner = {key: [one if np.size(one) else np.nan for one in values] for key, values in held.items()}
         yield from (((name, *path), array) for path, array in _flat(inner))
         if not inner:
             yield (name,), np.asarray(value)

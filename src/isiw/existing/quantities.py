@@ -92,7 +92,7 @@ class Columns:
                   for place, name in enumerate(names) if name not in used and name.strip()}  # fmt: skip
         doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})],
                                    layout.where)  # fmt: skip
-        doubts.require_reference(columns["isi"], layout.reference)
+        doubts.require_reference("column", "isi", columns["isi"].name, layout.reference, source)
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = WORDS["alone"] | WORDS["tap alone"]
             of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
@@ -147,6 +147,8 @@ def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Co
     for key, known, usual in (("asked", ISI_UNITS_MS, isi_unit), ("isi_sd", ISI_UNITS_MS, isi_unit),
                               ("background", EMG_UNITS, "uV")):  # fmt: skip
         if key in scaled:
+            if known is ISI_UNITS_MS:
+                doubts.require_of_kind("isi", "ISIs", scaled[key].name, scaled[key].of)
             factors[key] = known[unit_said(scaled[key].name, known) or usual] * (1e3 if known is EMG_UNITS else 1.0)
     scaled |= {key: replace(scaled[key], factor=factor) for key, factor in factors.items() if key in scaled}
     return scaled, (isi_unit, mep_unit)
@@ -199,7 +201,7 @@ def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
         if of is None or not (letters(name).startswith(of[1]) or of[1] in COLUMNS.get(key, ())):
             continue
         for text in dict.fromkeys(frame.iloc[:, place].dropna().astype(str)):
-            unit = unit_named(text)
+            unit = unit_named(text) or (text if of[1] and re.search(r"\d", text) else None)  # 0.1 ms is asked about
             fits = unit in known or (known is EMG_UNITS and unit not in ISI_UNITS_MS)  # or per cent, of amplitudes
             if unit is not None and (of[1] or fits):  # a unit of no column is of those that may have it
                 found[other] = unit if found.get(other) in {None, unit} else f"{found[other]}) ({unit}"
@@ -224,5 +226,9 @@ def _required_unit(key: str, what: str, column: Column, layout: Layout, known: M
         remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."
         raise column.doubted(f"says a unit of no {what}", other, remedy)
     some = ", ".join(filter(None, column.texts[:5])) or None
+    said, stated = unit_said(column.name, known), layout.unit_of(known)
+    if said and stated and known[said] != known[stated] and column.name not in layout.where:
+        remedy = f'Leave out the wrong one of them; if it is the name, say --where "{column.name}={doubts.ALL}", too.'
+        raise column.doubted("says another unit than the one that is stated", stated, remedy, said)
     what = f"the {what} of {column.of} in the column {column.name!r}"
-    return required_unit(layout, known, unit_said(column.name, known), what, some)
+    return required_unit(layout, known, said, what, some)
