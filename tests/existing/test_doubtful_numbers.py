@@ -154,6 +154,25 @@ def test_an_empty_field_of_a_structure_for_each_trial_is_an_empty_cell(tmp_path:
     assert [isi is None for isi, _ in found] == ALONE.tolist()
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".xlsx"])
+def test_a_title_says_units_and_what_is_relative(suffix: str, tmp_path: Path) -> None:
+    rows = [[isi / 1e3, mep] for isi, mep in zip(ISIS[~ALONE], MEPS[~ALONE], strict=True)]
+
+    def titled(title: str, mep: str = "MEP") -> Path:
+        made, path = pd.DataFrame([[title, None], ["ISI", mep], *rows]), tmp_path / f"P01{suffix}"
+        made.to_csv(path, index=False, header=False) if suffix == ".csv" else made.to_excel(
+            path, index=False, header=False
+        )
+        return path
+
+    found = trials_of(read_people(titled("P01 at 110 % of RMT: ISI in s and MEP in mV"), IMPACT))
+    assert found == [(pytest.approx(1e3 * isi), mep) for isi, mep in rows]
+    for title, says in (("MEP in % of control", "relative by what the title says"), ("ISI in samples", "got 'samples'"),
+                        ("ISI in s and MEP in µV", "another unit than the one that is stated")):  # fmt: skip
+        with pytest.raises(IsiwError, match=says):
+            read_people(titled(title), IMPACT.saying(units=("s", "mV")))
+
+
 @pytest.mark.parametrize("name", ["Intervall ab Magnetventil (ms)", "délai vanne (ms)", "ISI re solenoid (ms)"])
 def test_valves_have_names_in_several_languages(name: str) -> None:
     with pytest.raises(IsiwError, match=r"the column .* of the table counts from another event.*--column isi=NAME"):

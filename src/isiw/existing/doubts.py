@@ -45,6 +45,10 @@ RELATIVE: Final = re.compile(
     r"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|[/÷] *mep\b|"
     rf"([/÷]|\b(x|times|div|by|vs)\b) ?{_BASES}\b"
 )
+_RELATIVE_TITLES: Final = re.compile(
+    rf"(%|per ?cent|prozent|pour ?cent|por ?ciento) (of|vom|von|der|de|du|del|van) ?(the )?{_BASES}|\bnormali[sz]ed\b|"
+    r"\bnormiert|\bmeps? ?/"
+)
 WHOLE: Final = r"peak\W*(to|2)?\W*peak|\bp\W?(2|to|t)?\W?p\b|max\w*\W+(to\W+)?min"  # from peak to peak
 _MEASURES: Final = (
     r"\b(bas[ei]|zero|0|onset|null)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b|\b[aá]rea\b|\baire\b|fläche|"
@@ -113,7 +117,11 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
             ):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
-    title = _TITLES.search(words_of(f"{source} {frame.attrs.get('title', '')}")) if once else None
+    heading = words_of(f"{source} {frame.attrs.get('title', '')}")
+    if (found := _RELATIVE_TITLES.search(heading)) is not None:
+        remedy = "If they are not, correct the title, or the name of the file or sheet."
+        raise mep.doubted("seems to be relative by what the title says", found[0], remedy)
+    title = _TITLES.search(heading) if once else None
     if title or _MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"

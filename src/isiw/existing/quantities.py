@@ -74,7 +74,7 @@ class Columns:
         columns, of_units = dict[str, Column](), set[str]()
         for key, name in held.items():
             if name is not None:
-                units = units_beside(key, name, frame)
+                units = units_beside(key, name, frame) or _units_above(key, name, frame)
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
                 of_units |= units.keys()
@@ -206,6 +206,14 @@ def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
             if unit is not None and (of[1] or fits):  # a unit of no column is of those that may have it
                 found[other] = unit if found.get(other) in {None, unit} else f"{found[other]}) ({unit}"
     return found
+
+
+def _units_above(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
+    """The unit that the title says of ISIs or amplitudes, such as "times in s", if a column's name says none."""
+    known = {"isi": {**ISI_UNITS_MS, "samples": 1.0}, "mep": EMG_UNITS}.get(key, {})
+    title = str(frame.attrs.get("title", ""))
+    found = [unit for word in re.findall(r"(?i)\bin ([^\W\d_]+)", title) if (unit := unit_named(word)) in known]
+    return {} if not found or unit_said(name, known) else {"": str(found[0])}
 
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
