@@ -81,6 +81,8 @@ def test_halves_of_amplitudes_are_known_by_what_stands_beside_them(
 def test_the_column_of_the_meps_themselves_is_not_left_beside() -> None:
     with pytest.raises(IsiwError, match=r"'p2p \(mV\)' of the table has larger amplitudes.*--column \"mep=p2p"):
         read_people(table(**{"p2p (mV)": 1.9 * MEPS}), Layout("impact", alone=""))
+    (person,) = read_people(table(**{"MEP (% of control)": 100 * MEPS}), Layout("impact", alone=""))
+    assert person.unused == ("MEP (% of control)",)
     more = {"amplitude": np.arange(48) % 11 + 48, "response (uV)": 1e3 * MEPS}
     with pytest.raises(IsiwError, match=r"'response \(uV\)' .* says a unit .* 'amplitude' says none"):
         read_people(table(**more).drop(columns="MEP (mV)"), IN_UV)

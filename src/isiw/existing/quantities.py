@@ -174,6 +174,8 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     free = [(name, letters(re.sub(r"\.\d+$", "", name)))  # so pandas numbers names that come again
             for name in names if name not in layout.columns.values()]  # fmt: skip
     found = [(known, name) for known in COLUMNS[key] for name, plain_name in free if plain_name == known]
+    if key == "mep":  # one in per cent may stand beside it
+        found = [one for one in found if not re.search(doubts.RELATIVE, doubts.words_of(one[1]))] or found
     first = found[0][0] if found else ""
     several = [name for known, name in found
                if known == first or (key in _ASKED and len({known, first} & WORDS["vague"]) != 1)]  # fmt: skip
