@@ -3,29 +3,39 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
-from itertools import groupby
+from itertools import combinations, groupby, product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import LONGEST_ISI_MS
-from isiw.existing.doubts import ALL
-from isiw.existing.layout import letters
+from isiw.existing.doubts import ALL, RELATIVE, WHOLE, words_of
+from isiw.existing.layout import COLUMNS, EMG_UNITS, letters, unit_named
 from isiw.findings import AMPLITUDE_MV
+from isiw.types import FloatArray
 
 if TYPE_CHECKING:
     from isiw.existing.quantities import Columns
 
 _POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
+_FINE, _COARSE = 1e-3, 3e-3  # a mean of rounded numbers is hardly by chance so near to 1; one whose name has no unit
+_HALF: Final = (
+    r"\b(peak|trough|valley|pos(itive?)?|neg(ative?)?|min(imum)?|max(imum)?|[np][12]|spitze|tal|pic|pico|picco)\b"
+)
+_OF_REST: Final = (  # what says of EMG that it is no MEP, or of a number that it is another measure
+    r"backgr|noise|base|rest|\bpre|rms|hintergrund|rausch|bruit|fond|ruido|rumore|ruis|area|auc|fläche|\bsd\b"
+)
+_WITH, _ITS_HALF, _EXACT = 0.8, 0.7, 0.02  # halves correlate so with amplitudes, and are seldom a larger share of them
 _FEW, _FEWEST = 3, 12  # in a table with fewer rows ISIs may come again by chance
 _NEAR_MS, _ALIKE = (1.0, 25.0), 0.98  # so far from each other are ISIs that were asked and measured, and so alike
 
 
 def require_plain_numbers(columns: Columns) -> None:
     """Raise if the numbers of ISIs and amplitudes seem to be something else, in two units, or of each row twice."""
-    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each):
+    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each, _require_absolute, _require_whole):
         doubt(columns)
 
 
@@ -54,6 +64,7 @@ def _require_isis(columns: Columns) -> None:
             continue
         apart = odd <= 0 or odd > 2 * max(others)
         frequent = apart and (times[odd] >= 2 * max(others.values()) or _is_named(columns, odd))
+        frequent |= times[odd] >= 2 * _FEW and max(others.values()) < _FEW and len(others) >= _FEWEST
         if frequent or odd in {-1, -9, -99, -999, 99, 999} or odd > max(499.0, 2 * max(others)):
             what = f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone"
             remedy = f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never."
@@ -123,6 +134,72 @@ def _require_one_unit(columns: Columns) -> None:
         if 300 < np.median(high) / np.median(low) < 3000:
             got = f"{len(low)} up to {low[-1] / column.factor:g} and {len(high)} from {high[0] / column.factor:g} on"
             raise column.doubted("seems to be in two units", got, "Write all of them in one.")
+
+
+def _require_absolute(columns: Columns) -> None:
+    """Raise if amplitudes seem to be parts of a mean or of the largest, which is then just 1, or 100 per cent."""
+    mep, alone, odd = columns["mep"], {*columns.rows} - {*columns.paired}, dict[str, tuple[float, float, float]]()
+    rows = [row for row in columns.rows if mep.number(row) and columns.lost(row) is None and not columns.tap_alone(row)]
+    step = 10.0 ** -max((len(mep.texts[row].replace(",", ".").partition(".")[2]) for row in rows), default=0)
+    if len(rows) < _FEW or mep.name in columns.layout.where:
+        return
+    if (of_alone := mep.numbers[[row for row in rows if row in alone]]).size:
+        by_mean = 0.0 if of_alone.size >= _FEW and np.ptp(of_alone) == 0 else step / of_alone.size**0.5
+        most = _COARSE if columns.layout.unit_of(EMG_UNITS) else _FINE
+        odd["mean of TMS alone"] = float(of_alone.mean()), by_mean, most
+        odd["median of TMS alone"] = float(np.median(of_alone)), step, _FINE
+    of_all = mep.numbers[rows]
+    odd["mean"] = float(of_all.mean()), step / len(rows) ** 0.5, _FINE
+    odd["largest"] = float(of_all.max()), step, _FINE
+    for (what, (number, rounded, most)), one in product(odd.items(), (1.0, 100.0)):
+        if rounded <= most * one and abs(number - one) <= max(rounded if "mean" in what else 0.0, 1e-9 * one):
+            remedy = "Name the column of the amplitudes themselves: --column mep=NAME; if these are, say --where "
+            expected, remedy = "peak-to-peak amplitudes in mV, µV or V", f'{remedy}"{mep.name}={ALL}".'
+            raise mep.doubted(f"seems to be relative: its {what} is {one:g}", None, remedy, expected)
+
+
+def _require_whole(columns: Columns) -> None:
+    """Raise if amplitudes seem to be halves, by the other half in a column beside them."""
+    mep, halves = columns["mep"], _halves_beside(columns)
+    is_whole, is_half = (re.search(pattern, words_of(mep.name)) for pattern in (WHOLE, _HALF))
+    if any(np.nanmedian(np.abs(one + other - 1)) < _EXACT for one, other in combinations(halves.values(), 2)):
+        return
+    for name, shares in halves.items():
+        too_large = np.mean(shares > 1 + _EXACT) > _EXACT or (not is_whole and np.nanmedian(shares) > _ITS_HALF)
+        if too_large or (is_half and not is_whole):
+            remedy = "Name the column from peak to peak: --column mep=NAME, or add one; if it is this one, say --where "
+            why = f"seems to have one half of each MEP, and {name!r} beside it the other one"
+            raise mep.doubted(why, None, f'{remedy}"{mep.name}={ALL}".', "amplitudes from peak to peak")
+
+
+def _halves_beside(columns: Columns) -> dict[str, FloatArray]:
+    """Unused columns of halves of the same MEPs, as shares of the amplitudes; raise if one has the MEPs themselves."""
+    mep, stated, halves = columns["mep"], columns.layout.where.keys(), dict[str, FloatArray]()
+    meps, is_bare = mep.numbers[columns.rows], "mep" not in columns.layout.columns and not _has_unit(mep.name)
+    for name, column in columns.beside.items() if mep.name not in stated else ():
+        numbers, words = column.numbers[columns.rows], words_of(name)
+        shares = np.abs(numbers) / np.where(meps > 0, meps, np.nan)
+        if name in stated or (known := np.isfinite(shares)).sum() < _FEWEST:
+            continue
+        if is_bare and _has_unit(name) and not re.search(f"{_OF_REST}|{_HALF}|{RELATIVE}", words):
+            remedy = f'Say --column "mep={name}", or --column "mep={mep.name}".'
+            why = f"says a unit of amplitudes, and {mep.name!r} says none: which has the MEPs?"
+            raise column.doubted(why, None, remedy)
+        pair = meps[known], (shares * meps)[known]
+        if not all(map(np.ptp, pair)) or np.corrcoef(*pair)[0, 1] < _WITH:
+            continue
+        is_whole = (re.search(WHOLE, words) or letters(name) in COLUMNS["mep"]) and not re.search(RELATIVE, words)
+        if is_whole and 1.2 < np.nanmedian(shares) < 5:
+            remedy = f'Say --column "mep={name}"; if it is something else, say --where "{name}={ALL}".'
+            raise column.doubted(f"has larger amplitudes of the same trials than {mep.name!r}", None, remedy)
+        if re.search(_HALF, words) or np.mean(numbers < 0) > _WITH:
+            halves[name] = shares
+    return halves
+
+
+def _has_unit(name: str) -> bool:
+    """True if a name has the unit of an amplitude."""
+    return any(unit_named(word) in EMG_UNITS for word in re.findall(r"[^\W_]+", name))
 
 
 def _require_one_row_each(columns: Columns) -> None:

@@ -34,28 +34,42 @@ _TITLES: Final = re.compile(
     r"\b(means?|averages?|averaged|avg|mittelwerte?|moyennes?|promedios?|medi[ae]|gemiddelden?)\b"
 )  # what the names of files and sheets, and titles, say of means
 _ORIGINS: Final = {
-    "impact": r"\b(valve|ventil|command)",
-    "valve": r"\b(impact|hit|contact|aufprall)",
+    "impact": r"valve|ventil|\bcommand|solenoid|vanne|v[aá]lvula|valvola|\bklep|actuator",
+    "valve": r"\b(impact|hit|contact|aufprall|acceler)",
 }  # from another event
 _BASES: Final = "(control|base|baseline|mean|unconditioned|kontrolle)"
-_RELATIVE: Final = re.compile(
+RELATIVE: Final = re.compile(
     r"%|\bper ?c(ent)?|\bpct\b|pro[zc]ent|p(our|or)cent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|"
     r"\brel(ati\w*)?\b|\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|"
     r"\bdelta\b|\bd mep\b|[δΔ]|\bdiff|\bminus\b|mep +- |\bdb\b|\brank|[\^√]|\bresid|fitted|predict|smooth|winsor|"
     r"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|[/÷] *mep\b|"
     rf"([/÷]|\b(x|times|div|by|vs)\b) ?{_BASES}\b"
 )
+_RELATIVE_TITLES: Final = re.compile(
+    rf"(%|per ?cent|prozent|pour ?cent|por ?ciento) (of|vom|von|der|de|du|del|van) ?(the )?{_BASES}|\bnormali[sz]ed\b|"
+    r"\bnormiert|\bmeps? ?/"
+)
+WHOLE: Final = r"peak\W*(to|2)?\W*peak|\bp\W?(2|to|t)?\W?p\b|max\w*\W+(to\W+)?min"  # from peak to peak
 _MEASURES: Final = (
     r"\b(bas[ei]|zero|0|onset|null)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b|\b[aá]rea\b|\baire\b|fläche|"
     r"\bauc\b|\brms\b|integra|rectif|latenc|"
-    r"^(?!.*(peak\W*(to|2)?\W*peak|\bp\W?(2|to|t)?\W?p\b|max\w*\W+(to\W+)?min)).*\b(trough|max|maximum|min|minimum)\b"
+    r"[\[(] ?(counts?|adc|adu|bits?|lsb|digits?|units?|[cm]m|kv|pu|sd|au)\b|\b[mµμu]?v([²/]| ?[*·×] ?m?s\b|m?s\b)|"
+    rf"^(?!.*({WHOLE})).*\b(trough|max|maximum|min|minimum)\b"
+)
+_FACTOR: Final = (
+    r"[×*·/÷] ?\d|(?<![a-z])x ?\d|\b\d+ ?([×*·]|x\b)|\b10 ?[\^⁺⁻⁰¹²³⁴-⁹]|(\b|\d)e ?[-+]\d|"
+    r"(?<![\w.,<>≤≥=-])(10+|0[.,]\d+) ?([mµμu]?s(ec)?|[mµμun]?v) ?([])]|$)"
+)  # such as x10 ms, 1/10 mV, 10^-1 or 0.1 ms
+_NUMBERS: Final = (
+    r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe|rank|log\d*|ln|z)\b|"
+    r"[\[(] ?([cd]s|ticks?|steps?|pts?|points?|min|hz|deg|a\.? ?u|frames?|%)\b"
 )
 _OTHERWISE: Final = (
-    ("mep", _RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
+    ("mep", rf"\bgain\b|amplified|verstärk|{_FACTOR}", "are multiplied", "amplitudes at the electrodes"),
+    ("mep", RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
     ("mep", _MEASURES, "are of another measure", "amplitudes from peak to peak"),
-    ("mep", r"\bgain\b|amplified|verstärk", "are multiplied", "amplitudes at the electrodes"),
-    ("isi", r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe|rank|log\d*|ln|z)\b",
-     "are numbers of something", "the intervals themselves, in ms or s"),
+    ("isi", _FACTOR, "are multiplied", "the intervals themselves, in ms or s"),
+    ("isi", _NUMBERS, "are numbers of something", "the intervals themselves, in ms or s"),
 )  # fmt: skip # what a column's name says of numbers that are no amplitudes or ISIs, and what is expected
 _INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
 _NUMBER: Final = re.compile(r"[-.,]*\d[\d.,]*")
@@ -66,20 +80,20 @@ _SHARED: Final = 0.8
 _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
 
-def _words(name: str) -> str:
+def words_of(name: str) -> str:
     """A name in lower case, its words apart; units such as mV are one."""
     return re.sub("mep(?!s)", " mep ", re.sub(r"(?<=[a-z]{2})(?=[A-Z])", " ", name.replace("_", " ")).casefold())
 
 
 def doubtful_words(text: str) -> list[str]:
-    """What a text has of amplitudes that are relative to others, or means."""
-    return [found[0] for pattern in (_RELATIVE, _MEANS) if (found := pattern.search(_words(text)))]
+    """What a text has of amplitudes that are relative to others or multiplied, or of means."""
+    return [found[0] for pattern in (RELATIVE, _FACTOR, _MEANS) if (found := re.search(pattern, words_of(text)))]
 
 
 def require_of_kind(key: str, what: str, name: str, source: str) -> None:
     """Raise if a column's name says that its numbers are something else, whatever unit is stated."""
     for of, pattern, are, expected in _OTHERWISE:
-        if of == key and (found := re.search(pattern, _words(name))):
+        if of == key and (found := re.search(pattern, words_of(name))):
             what = f"the {what} of {source} in the column {name!r} {are}"
             remedy = f"Name the column that holds these: --column {key}=NAME; if it is this one, correct its name."
             raise InvalidValueError(what, got=found[0].strip(), expected=expected, remedy=remedy)
@@ -103,8 +117,12 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
             ):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
-    title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
-    if title or _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
+    heading = words_of(f"{source} {frame.attrs.get('title', '')}")
+    if (found := _RELATIVE_TITLES.search(heading)) is not None:
+        remedy = "If they are not, correct the title, or the name of the file or sheet."
+        raise mep.doubted("seems to be relative by what the title says", found[0], remedy)
+    title = _TITLES.search(heading) if once else None
+    if title or _MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"
         what += "".join(f" beside {name!r}" for name in beside)
@@ -115,7 +133,7 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
 
 def _says(text: str, known: AbstractSet[str]) -> bool:
     """True if a text, besides what stands in brackets, has words of a kind alone, such as SD (mV) or Mean (n = 8)."""
-    bare = re.sub(r"[\[(].*?[\])]|\bn ?= ?\d+", " ", _words(text))
+    bare = re.sub(r"[\[(].*?[\])]|\bn ?= ?\d+", " ", words_of(text))
     words = [word for word in re.findall(r"\w+", bare) if word not in WORDS["beside spreads"]]
     return bool(words) and ({*words} <= known or "".join(words) in known)
 
@@ -132,22 +150,23 @@ def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> N
             remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
             raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
         remarks = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
-        if (remark := next(filter(_is_verdict, remarks), None)) is not None:
+        if (remark := next(filter(is_verdict, remarks), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
 
 
 def key_of_flags(name: str) -> str | None:
     """What a column would hold whose name has a word of trials that do not count, or of those that do."""
-    words = {*re.findall(r"[^\W\d_]+", _words(name))}
+    words = {*re.findall(r"[^\W\d_]+", words_of(name))}
     kinds = {"exclude": WORDS["left out"] | WORDS["flags"], "status": WORDS["counted"]}
     return next((key for key, known in kinds.items() if words & (known | {*COLUMNS[key]})), None)
 
 
-def _is_verdict(text: str) -> bool:
+def is_verdict(text: str) -> bool:
+    """True if a remark says that a trial does not count."""
     said = text.casefold().partition(":")[0].strip(" !.?#*()[]")
-    words = {said, *(re.findall(r"\w+", said) if said.count(" ") < _WORDS else ())}
-    return not words.isdisjoint(WORDS["left out"]) and words.isdisjoint(WORDS["no"])
+    words = {*(re.findall(r"\w+", said) if said.count(" ") < _WORDS else ())}
+    return said in WORDS["left out"] or (not words.isdisjoint(WORDS["left out"]) and words.isdisjoint(WORDS["no"]))
 
 
 def require_no_summaries(columns: Columns, apart: int | None) -> None:
@@ -179,11 +198,12 @@ def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
     return number not in groups[0] and any(abs(each - number) <= slack for each in (*means, *chain(*sds)))
 
 
-def require_reference(isi: Column, reference: Reference | None) -> None:
-    """Raise if the name of ISIs says that they count from another event than the one that is stated."""
-    if reference is not None and (found := re.search(_ORIGINS[reference], _words(isi.name))):
-        remedy = "Correct --reference, or name the column of the other ISIs: --column isi=NAME."
-        raise isi.doubted("counts from another event than is stated", reference, remedy, f"what {found[0]!r} says")
+def require_reference(kind: str, key: str, name: str, reference: Reference | None, source: str) -> None:
+    """Raise if the name of ISIs, or of what marks their beginning, says another event than the one that is stated."""
+    if reference is not None and (found := re.search(_ORIGINS[reference], words_of(name))):
+        remedy = f"Correct --reference, or name the {kind} of the other: --{kind} {key}=NAME."
+        what = f"the {kind} {name!r} of {source} counts from another event than is stated"
+        raise InvalidValueError(what, got=reference, expected=f"what {found[0]!r} says", remedy=remedy)
 
 
 def require_short(delivered: Delivered, layout: Layout) -> None:
@@ -302,23 +322,52 @@ def _require_one_kind(columns: Columns) -> None:
     """Raise if an unused column has several values at each ISI, as one of muscles, people, sides or conditions has."""
     isi = columns["isi"]
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
-    for name, column in columns.beside.items():
-        texts = [text for _, row in by_isi if (text := column.text(row))]
-        are_words = not any(map(_NUMBER.fullmatch, texts))
-        kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
-        if name in columns.layout.where or len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
+    for name, column in columns.beside.items() if by_isi else ():
+        if name in columns.layout.where:
             continue
-        if not are_words and (len(kinds) > len(by_isi) / _ROWS_A_NUMBER or _counts_again(column, by_isi)):
-            continue
-        usual = min(kinds.values()) if are_words else len(texts) / len(kinds)
-        size = min(math.ceil(4 * len(texts) / usual), len(texts) // 2)
-        bins = [texts[first : first + size] for first in range(0, len(texts) - size + 1, size)]
-        shares = [len(kinds.keys() & {*each}) / len(kinds) for each in bins]
-        if sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins):
-            few = ", ".join(list(kinds)[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
-            remedy = f'Say --where "{name}={next(iter(kinds))}" for one of them, --where "{name}={ALL}" if all are to '
+        texts = {row: column.text(row).casefold() for _, row in by_isi}
+        alone = [row for row, text in texts.items() if " " in plain(text) and plain(text) in WORDS["alone"]]
+        if alone and len({*texts.values()}) > 1:
+            remedy = f'Say --column "condition={name}"; if these are pairs, say --where "{name}={ALL}".'
+            raise column.refused(alone[0], "says TMS alone, and nothing is read of it", remedy)
+        if {*texts.values()} <= {"", *WORDS["yes"], *WORDS["no"]} and _are_flags(texts, by_isi):
+            remedy = f'If yes leaves a trial out, say --column "exclude={name}"; if no does, --column "status={name}"; '
+            remedy += f'if all are to be analysed together, --where "{name}={ALL}".'
+            raise column.doubted("says yes or no of each pair, and nothing is read of it", None, remedy)
+        if kinds := kinds_at_each(by_isi, column):
+            few = ", ".join(kinds[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
+            remedy = f'Say --where "{name}={kinds[0]}" for one of them, --where "{name}={ALL}" if all are to '
             remedy += f'be analysed together, or --column "subject={name}" if they are people.'
             raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
+
+
+def _are_flags(texts: Mapping[int, str], by_isi: Sequence[tuple[float, int]]) -> bool:
+    """True if yes and no are not of a range of several ISIs, as of those with a response."""
+    said = np.array([texts[row] in WORDS["yes"] for _, row in by_isi])
+    if said.all() or not said.any():
+        return False
+    isis_ms = np.array([isi_ms for isi_ms, _ in by_isi])
+    is_range = np.count_nonzero(np.diff(said)) <= 2 and min(said.sum(), (~said).sum()) >= _FEW
+    times = sorted((np.unique(own, return_counts=True)[1] for own in (isis_ms[said], isis_ms[~said])), key=len)
+    is_mark = len(times[0]) == 1 and times[0][0] >= 2 * max(times[1])  # of an ISI that stands for something
+    return bool(is_mark or not is_range)
+
+
+def kinds_at_each(by_isi: Sequence[tuple[float, int]], column: Column) -> list[str]:
+    """The values of a column, if several of them come at each of the ISIs of some rows, ascending."""
+    texts = [text for _, row in by_isi if (text := column.text(row))]
+    are_words = not any(map(_NUMBER.fullmatch, texts))
+    kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
+    if len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
+        return []
+    if not are_words and (len(kinds) > len(by_isi) / _ROWS_A_NUMBER or _counts_again(column, by_isi)):
+        return []
+    usual = min(kinds.values()) if are_words else len(texts) / len(kinds)
+    size = min(math.ceil(4 * len(texts) / usual), len(texts) // 2)
+    bins = [texts[first : first + size] for first in range(0, len(texts) - size + 1, size)]
+    shares = [len(kinds.keys() & {*each}) / len(kinds) for each in bins]
+    several = sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins)
+    return [*kinds] if several else []
 
 
 def _counts_again(column: Column, by_isi: Sequence[tuple[float, int]]) -> bool:
@@ -333,7 +382,7 @@ def _counts_again(column: Column, by_isi: Sequence[tuple[float, int]]) -> bool:
 def _require_one_intensity(columns: Columns) -> None:
     """Raise if TMS alone had other intensities than pairs by a column that is not used, so that it is no baseline."""
     for name, column in columns.beside.items():
-        rows = columns.rows if name not in columns.layout.where and _INTENSITY.search(_words(name)) else ()
+        rows = columns.rows if name not in columns.layout.where and _INTENSITY.search(words_of(name)) else ()
         of_pairs = {text: None for row in columns.paired if rows and (text := column.text(row))}
         others = dict.fromkeys(text for row in rows if (text := column.text(row)) not in {"", *of_pairs})
         if of_pairs and others:

@@ -206,13 +206,15 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     book = pd.ExcelFile(io.BytesIO(content), engine="openpyxl")
     if layout.sheet is not None:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
-    sheets, heads = dict[str, list[list[Any]]](), dict[str, int]()
+    sheets, heads, titles = dict[str, list[list[Any]]](), dict[str, int](), dict[str, str]()
     for name in [layout.sheet] if layout.sheet is not None else map(str, book.sheet_names):
         cells = book.parse(name, header=None, dtype=object, keep_default_na=False).to_numpy().tolist()
         rows = cells[layout.skip_lines :]
         first = next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0)
         sheets[name] = rows if layout.names else rows[first:]
         heads[name] = len(cells) - len(sheets[name]) + (0 if layout.names else 1)
+        above = chain.from_iterable(cells[: max(heads[name] - 1, 0)])
+        titles[name] = " ".join([name, *(cell for cell in above if isinstance(cell, str))])
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
     if len(with_trials) > 1:
         what = "several sheets of the workbook hold trials"
@@ -235,7 +237,7 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
             pairs = zip_longest(rows[0], shown[: len(rows[0])])
             rows[0] = [f"{name} ({unit})" if unit else name for name, unit in pairs]
             break
-    return _table(rows, layout, chosen)
+    return _table(rows, layout, titles[chosen])
 
 
 def _flag_coloured(rows: list[list[Any]], coloured: Iterable[int]) -> None:
@@ -327,7 +329,8 @@ def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
         each = list(value) if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim == 1) else []
         inner = value if isinstance(value, dict) else {}
         if each and all(isinstance(one, dict) for one in each):
-            inner = {key: [one.get(key, np.nan) for one in each] for key in each[0]}
+            held = {key: [one.get(key, np.nan) for one in each] for key in each[0]}
+            inner = {key: [one if np.size(one) else np.nan for one in values] for key, values in held.items()}
         yield from (((name, *path), array) for path, array in _flat(inner))
         if not inner:
             yield (name,), np.asarray(value)

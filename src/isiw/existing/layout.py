@@ -64,6 +64,8 @@ class Layout(Checked):
         reference: the event that ISIs count from, `"impact"` (of the hammer, or an electrical pulse) or `"valve"`.
         columns: the name of a column by what it holds, one of `COLUMNS`.
         where: by the name of a column, what its cells say in the rows to read, such as `FCR` of `muscle`; `*` for any.
+            Of a recording, by `event` the name of an event before the pairs to read; `*` by a channel's name if its
+            header is wrong.
         units: the units of columns whose names do not say theirs, such as `("ms", "mV")`.
         alone: what stands in the place of the ISI of TMS alone, such as `"single"` or `"-1"`; `""` is an empty cell.
         decimal: the decimal sign, `"."` or `","`.

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any, Final
 
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import says_alone
+from isiw.existing.cells import Column, says_alone
+from isiw.existing.doubts import ALL, is_verdict, kinds_at_each
 from isiw.existing.layout import MARKS, Layout, plain
+from isiw.existing.quantities import require_one
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import FloatArray
 
 _TWICE_S: Final = 3e-3  # a trigger that is found twice within so short a time is one, which came at the first edge
 _SAME_PULSE_S: Final = 20e-3  # an event of a pulse alone marks the pulse that is marked within so short a time
+_FEW: Final = 3  # so many pulses after an event, at different times, are hardly by chance
+EVENT: Final = "event"  # what `where` calls the events of which nothing else is read
+_NONE: Final = "no event"
 _OF_NONE: Final = re.compile("(?i)bad|sweep$|edge|.*boundary|.*new segment")  # events of no stimuli
 _EARLY_S: Final = 20e-3  # a pulse at most so long before a tap was meant to follow it, and is TMS before the impact
 
@@ -66,10 +72,15 @@ def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
     return next((each for each in fits if each and {*each} <= {*names}), [])
 
 
+def _others(events: pd.DataFrame, layout: Layout) -> list[str]:
+    """The names of the events of which nothing is read."""
+    used = {name for key in MARKS for name in _fitting(events, key, layout)}
+    return [name for name in names_of(events) if name not in used and not _OF_NONE.match(name)]
+
+
 def note_of_others(events: pd.DataFrame, layout: Layout) -> tuple[str, ...]:
     """A sentence about the events of which nothing is read, if there are any."""
-    used = {name for key in MARKS for name in _fitting(events, key, layout)}
-    others = [name for name in names_of(events) if name not in used and not _OF_NONE.match(name)]
+    others = [] if EVENT in layout.where else _others(events, layout)
     found = ", ".join(f"{name!r} ({len(times_of(events, name))})" for name in others[:5])
     more = f" and {counted(len(others) - 5, 'other')}" if len(others) > 5 else ""
     return (f"Nothing is read of the events {found}{more}. Do some mark stimuli?",) if others else ()
@@ -117,7 +128,66 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
         for at in sorted([*at_s.tolist(), *more_s])
     ]
     _require_one_each(pulses, origins_s, layout, source)
-    return _with_the_unmarked(pulses, layout, source)
+    _require_no_verdicts(events, at_s, layout, source)
+    return _with_the_unmarked(_of_one_kind(pulses, events, key, layout, source), layout, source)
+
+
+def _require_no_verdicts(events: pd.DataFrame, at_s: FloatArray, layout: Layout, source: str) -> None:
+    """Raise if a remark beside a trial says that it does not count; one that begins with BAD may span it."""
+    odd = [name for name in names_of(events) if is_verdict(name) and EVENT not in layout.where]
+    for name, onset_s, lasts_s in events[["name", "onset", "duration"]].itertuples(index=False):
+        is_bad = re.match("(?i)bad", name) and (lasts_s > 0 or np.any(np.abs(at_s - onset_s) < _EARLY_S))
+        if name in odd and not is_bad and "boundary" not in name.casefold():
+            what = f"an event of {source} says that a trial does not count, and lies beside it"
+            remedy = "Mark the trial itself by an annotation whose name begins with BAD, or remove its pulse; if all "
+            remedy += f'are to be analysed, say --where "{EVENT}={ALL}".'
+            raise InvalidValueError(what, got=f"{name!r} at {onset_s:.3f} s", remedy=remedy)
+
+
+def _before(pulses: Sequence[Pulse], events: pd.DataFrame, layout: Layout) -> list[dict[str, float]]:
+    """Events of which nothing is read, by the first pulse after them: how long before it each name came [s]."""
+    found: list[dict[str, float]] = [{} for _ in pulses]
+    latest_s = np.array([pulse.at_s for pulse in pulses]) + _EARLY_S
+    for name in _others(events, layout):
+        times_s = times_of(events, name)
+        places = np.searchsorted(latest_s, times_s[times_s <= latest_s.max(initial=0.0)]).tolist()
+        if len({*places}) == len(places):  # or it comes by itself, as an artefact does
+            for place, at_s in zip(places, times_s.tolist(), strict=False):
+                found[place][name] = pulses[place].at_s - at_s
+    return found
+
+
+def _of_one_kind(pulses: list[Pulse], events: pd.DataFrame, key: str, layout: Layout, source: str) -> list[Pulse]:
+    """The pulses alone, and the pairs after an event of the name that is stated, of which nothing else is read.
+
+    Raises:
+        InvalidValueError: pairs of each ISI come after events of several names, or some after one and some not, as
+            those of two conditions do; or pulses without a tap come after one, as after a tap of another kind.
+    """
+    names, wanted = _before(pulses, events, layout), layout.where.get(EVENT, "")
+    longest_s = layout.longest_isi_ms / 1e3
+    pairs = sorted((pulse.isi_s, n) for n, pulse in enumerate(pulses) if pulse.isi_s is not None)
+    near = [{name for name, before_s in own.items() if before_s <= longest_s} or {_NONE} for own in names]
+    used = [{*own} for own in names] if all(names[n] for _, n in pairs) else near
+    if wanted:
+        require_one("event", source, wanted, dict.fromkeys([ALL, *chain.from_iterable(used)]))
+        return [one for one, own in zip(pulses, used, strict=True) if one.isi_s is None or wanted in {ALL, *own}]
+    column = Column(EVENT, [" + ".join(sorted(own)) for own in used], of=source)
+    if kinds := kinds_at_each(pairs, column):
+        what, got = f"pairs of each ISI in {source} come after events of several names", ", ".join(kinds[:5])
+        remedy = f'Say --where "{EVENT}={min(used[pairs[0][1]])}" for those after one of them, or --where '
+        raise InvalidValueError(what, got=got, remedy=f'{remedy}"{EVENT}={ALL}" if all are to be analysed together.')
+    of_pairs = set().union(*(near[n] for _, n in pairs))
+    bare = [names[n] for n, one in enumerate(pulses) if one.isi_s is None and not (one.alone or one.lost)]
+    for name in {*chain.from_iterable(bare)} - of_pairs if layout.unmarked != "lost" else ():
+        before_s = [own[name] for own in bare if own.get(name, np.inf) <= longest_s]
+        if len(before_s) >= _FEW and np.ptp(before_s) > _TWICE_S:
+            what = f"{counted(len(before_s), 'pulse')} of {source} without a marked {key} come after an event {name!r}"
+            remedy = f'Say --marker "{key}={name}" for these pairs, or --unmarked lost to leave them out; if all taps '
+            remedy += f'are alike, give their events one name; if it is none, say --where "{EVENT}={ALL}".'
+            raise InvalidValueError(what, got=f"{1e3 * min(before_s):.0f} to {1e3 * max(before_s):.0f} ms later",
+                                    remedy=remedy)  # fmt: skip
+    return pulses
 
 
 def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout, source: str) -> None:

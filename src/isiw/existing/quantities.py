@@ -74,7 +74,7 @@ class Columns:
         columns, of_units = dict[str, Column](), set[str]()
         for key, name in held.items():
             if name is not None:
-                units = units_beside(key, name, frame)
+                units = units_beside(key, name, frame) or _units_above(key, name, frame)
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
                 of_units |= units.keys()
@@ -92,7 +92,7 @@ class Columns:
                   for place, name in enumerate(names) if name not in used and name.strip()}  # fmt: skip
         doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})],
                                    layout.where)  # fmt: skip
-        doubts.require_reference(columns["isi"], layout.reference)
+        doubts.require_reference("column", "isi", columns["isi"].name, layout.reference, source)
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = WORDS["alone"] | WORDS["tap alone"]
             of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
@@ -147,6 +147,8 @@ def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Co
     for key, known, usual in (("asked", ISI_UNITS_MS, isi_unit), ("isi_sd", ISI_UNITS_MS, isi_unit),
                               ("background", EMG_UNITS, "uV")):  # fmt: skip
         if key in scaled:
+            if known is ISI_UNITS_MS:
+                doubts.require_of_kind("isi", "ISIs", scaled[key].name, scaled[key].of)
             factors[key] = known[unit_said(scaled[key].name, known) or usual] * (1e3 if known is EMG_UNITS else 1.0)
     scaled |= {key: replace(scaled[key], factor=factor) for key, factor in factors.items() if key in scaled}
     return scaled, (isi_unit, mep_unit)
@@ -172,6 +174,8 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     free = [(name, letters(re.sub(r"\.\d+$", "", name)))  # so pandas numbers names that come again
             for name in names if name not in layout.columns.values()]  # fmt: skip
     found = [(known, name) for known in COLUMNS[key] for name, plain_name in free if plain_name == known]
+    if key == "mep":  # one in per cent may stand beside it
+        found = [one for one in found if not re.search(doubts.RELATIVE, doubts.words_of(one[1]))] or found
     first = found[0][0] if found else ""
     several = [name for known, name in found
                if known == first or (key in _ASKED and len({known, first} & WORDS["vague"]) != 1)]  # fmt: skip
@@ -199,11 +203,19 @@ def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
         if of is None or not (letters(name).startswith(of[1]) or of[1] in COLUMNS.get(key, ())):
             continue
         for text in dict.fromkeys(frame.iloc[:, place].dropna().astype(str)):
-            unit = unit_named(text)
+            unit = unit_named(text) or (text if of[1] and re.search(r"\d", text) else None)  # 0.1 ms is asked about
             fits = unit in known or (known is EMG_UNITS and unit not in ISI_UNITS_MS)  # or per cent, of amplitudes
             if unit is not None and (of[1] or fits):  # a unit of no column is of those that may have it
                 found[other] = unit if found.get(other) in {None, unit} else f"{found[other]}) ({unit}"
     return found
+
+
+def _units_above(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
+    """The unit that the title says of ISIs or amplitudes, such as "times in s", if a column's name says none."""
+    known = {"isi": {**ISI_UNITS_MS, "samples": 1.0}, "mep": EMG_UNITS}.get(key, {})
+    title = str(frame.attrs.get("title", ""))
+    found = [unit for word in re.findall(r"(?i)\bin ([^\W\d_]+)", title) if (unit := unit_named(word)) in known]
+    return {} if not found or unit_said(name, known) else {"": str(found[0])}
 
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
@@ -224,5 +236,9 @@ def _required_unit(key: str, what: str, column: Column, layout: Layout, known: M
         remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."
         raise column.doubted(f"says a unit of no {what}", other, remedy)
     some = ", ".join(filter(None, column.texts[:5])) or None
+    said, stated = unit_said(column.name, known), layout.unit_of(known)
+    if said and stated and known[said] != known[stated] and column.name not in layout.where:
+        remedy = f'Leave out the wrong one of them; if it is the name, say --where "{column.name}={doubts.ALL}", too.'
+        raise column.doubted("says another unit than the one that is stated", stated, remedy, said)
     what = f"the {what} of {column.of} in the column {column.name!r}"
-    return required_unit(layout, known, unit_said(column.name, known), what, some)
+    return required_unit(layout, known, said, what, some)

@@ -22,6 +22,7 @@ from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import CHANNELS, EMG_UNITS, Layout
 from isiw.existing.limits import ReadingLimits, require_file, require_most, require_table
+from isiw.existing.markers import EVENT
 from isiw.existing.quantities import Columns
 from isiw.files import is_mcap
 from isiw.findings import INTENSITY_PCT, Kind
@@ -118,7 +119,8 @@ def _require_used(contents: Contents, path: Path | None, layout: Layout) -> None
     kind, used, keys = "a table", _OF_ROWS, dict[str, AbstractSet[str]]()
     if contents.tracks and contents.trials is None:
         kind, used = "a recording", f"{_OF_SAMPLES} unmarked{' decimal' if in_columns else ''}"
-        keys = {"units": {*EMG_UNITS}, "channels": {*CHANNELS} - (set() if in_columns else {"events"})}
+        keys = {"where": {EVENT, *(track.name for track in contents.tracks)}}
+        keys |= {"units": {*EMG_UNITS}, "channels": {*CHANNELS} - (set() if in_columns else {"events"})}
     elif contents.tracks:
         kind, used = "of sweeps whose ISIs are stated", f"{_OF_ROWS} {_OF_SAMPLES}"
         used += " pulse_at_ms" if in_columns else " unmarked"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
@@ -14,7 +15,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing, required_unit
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubtful_numbers import require_plain_isis
-from isiw.existing.doubts import is_rectified, require_said
+from isiw.existing.doubts import ALL, is_rectified, require_reference, require_said, words_of
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
@@ -27,11 +28,17 @@ from isiw.signals.judgement import judge
 from isiw.signals.limits import SignalLimits
 from isiw.signals.watch import shown_by
 from isiw.sweeps import Channel, Sweep
+from isiw.text.sanitize import counted
 from isiw.trials import Status, Stimulus, Trial
 from isiw.types import FloatArray
 
 _BEFORE_S, _AFTER_S = 0.15, 0.1  # of a continuous recording, before the longest ISI and after the pulse
+_OTHERWISE: Final = re.compile(
+    r"\bgain\b|amplified|verstärk|[x×*] ?10|\b1/10|10 ?[\^⁺⁻⁰¹²³⁴-⁹]|(\b10+|0[.,]\d+) ?[mµμun]?v\b|\brms\b|integra|"
+    r"rectif|gleichger|envelope|\b(means?|averaged?|averages?|avg|gemittelt|mittelwerte?|moyennes?)\b"
+)  # what a channel's name says that is not the EMG as it was recorded
 _APART_MS: Final = 2.0  # an ISI in a table that differs by more from that of the events is another one
+_SLOW_HZ: Final = 1000.0  # a trigger with fewer samples a second is said
 _CLEAR, _EDGE, _FEW = 25.0, 0.4, 3  # an MEP so many times the EMG at rest is cut off if it has so much at an edge
 _IF_NONE_COUNTS: Final = (
     "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest without mains "
@@ -47,10 +54,12 @@ OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
 def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     """The trials of what a file holds, whose sweeps are cut already or yet to be cut out, judged as in a session."""
     source, key = contents.source, origin_key(layout)
-    contents, signals, unit = _with_signals(contents, layout)
+    contents, tracks, unit = _with_signals(contents, layout)
+    signals = {name: track for name, track in tracks.items() if name not in MARKERS}
     reference, unused, person = layout.required_reference(source), tuple[str, ...](), ""
     if contents.trials is None or contents.pulse_at_s is None:
-        pulses = pulses_of(contents.events, key, layout, source)
+        tapped = tracks.get(key, signals["emg"])
+        pulses = _with_the_cut_off(pulses_of(contents.events, key, layout, source), tapped, layout)
         contents = replace(contents, notes=(*contents.notes, *note_of_others(contents.events, layout)))
     else:
         pulses, unused, person = _pulses_of_rows(contents, signals["emg"], layout)
@@ -78,6 +87,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         trials.append(replace(judged, excluded=is_bad or pulse.said.get("excluded") in {True, "true", "True"}))
         if trials[-1].told:
             seen.append((sweep, judged))
+    contents = replace(contents, notes=(*contents.notes, *_note_of_the_cut_off(trials)))
     if trials and not seen:
         got = ", ".join(sorted({str(trial.reason) for trial in trials if trial.reason})) or "excluded ones"
         remedy = " ".join([*contents.notes, _IF_NONE_COUNTS.format(limits.background_uv)])
@@ -127,20 +137,62 @@ def _since_pulse_ms(sweep: Sweep) -> FloatArray:
 
 
 def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[str, Track], str]:
-    """Contents with the events of triggers, the channels that are no triggers, the EMG in mV, and what unit it had."""
+    """Contents with the events of triggers, the channels, the EMG in mV, and what unit it had."""
     held = {"emg": None, **dict.fromkeys(key for key in layout.channels if key != "events")}
     tracks = {key: _track_of(contents, key, layout) for key in held}
+    key = origin_key(layout)
+    for kind, names in (("marker", layout.markers), ("channel", layout.channels)):
+        require_reference(kind, key, names.get(key, ""), layout.reference, contents.source)
+    odd = _OTHERWISE.search(words_of(tracks["emg"].name))
+    if odd is not None and tracks["emg"].name not in layout.where:
+        what = f"the channel {tracks['emg'].name!r} of {contents.source} is not EMG as it was recorded"
+        remedy = f'Say --channel emg=NAME of another; if it is, say --where "{tracks["emg"].name}={ALL}".'
+        raise InvalidValueError(what, got=odd[0], remedy=remedy)
     if layout.rate_hz is not None:
         require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
+    notes = contents.notes
+    for slow in [one for name, one in tracks.items() if name in MARKERS and one.rate_hz < _SLOW_HZ]:
+        notes = (*notes, f"{slow.name!r} has a sample each {1e3 / slow.rate_hz:g} ms: ISIs are not known better.")
     triggers = events_of((key, at_s, 0.0) for key in MARKERS if key in tracks for at_s in tracks[key].onsets_s())
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
     emg = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
-    known, notes = unit_named(emg.unit), contents.notes
-    unit = required_unit(layout, EMG_UNITS, known, f"the channel {emg.name!r} of {contents.source}", emg.unit or None)
-    if known not in {None, unit}:
-        notes = (*notes, f"{contents.source} says {emg.unit}, and {unit} is used, as stated.")
-    signals = {key: track for key, track in tracks.items() if key not in MARKERS}
-    return replace(contents, events=events, notes=notes), {**signals, "emg": emg.scaled(EMG_UNITS[unit])}, unit
+    unit, noted = _unit_of(emg, contents, layout)
+    return (
+        replace(contents, events=events, notes=(*notes, *noted)),
+        {**tracks, "emg": emg.scaled(EMG_UNITS[unit])},
+        unit,
+    )
+
+
+def _unit_of(emg: Track, contents: Contents, layout: Layout) -> tuple[str, tuple[str, ...]]:
+    """The unit of the EMG, and a note if the file says another one."""
+    what, known = f"the channel {emg.name!r} of {contents.source}", unit_named(emg.unit)
+    unit = required_unit(layout, EMG_UNITS, known, what, emg.unit or None)
+    if known == unit or (known is None and not re.search(r"\d", emg.unit)):
+        return unit, ()
+    if not contents.unit_is_usual and emg.name not in layout.where:
+        what += " says another unit than the one that is stated"
+        remedy = f'Leave --unit out; if the file is wrong, say --where "{emg.name}={ALL}", too.'
+        raise InvalidValueError(what, got=unit, expected=emg.unit, remedy=remedy)
+    return unit, (f"{contents.source} says {emg.unit}, and {unit} is used, as stated.",)
+
+
+def _note_of_the_cut_off(trials: Sequence[Trial]) -> tuple[str, ...]:
+    """A sentence about pulses without EMG, if there are any."""
+    cut = sum(trial.reason is Kind.MISSING_CHANNEL for trial in trials)
+    said = f"{counted(cut, 'pulse')} of {len(trials)} came where no EMG was recorded up to the end of the MEP."
+    return (said,) if cut else ()
+
+
+def _with_the_cut_off(pulses: list[Pulse], tapped: Track, layout: Layout) -> list[Pulse]:
+    """Pulses of which those are lost before which no tap can be seen, since the channel that shows it begins later."""
+    ends = [(one.start_s, one.start_s + one.samples / tapped.rate_hz) for one in tapped.stretches]
+    if all(pulse.isi_s is None for pulse in pulses) or 2 * len(ends) > len(pulses):  # or each sweep was recorded alone
+        return pulses
+    longest_s = layout.longest_isi_ms / 1e3
+    seen = [any(begin_s <= one.at_s - longest_s and one.at_s <= end_s for begin_s, end_s in ends) for one in pulses]
+    return [one if known or one.isi_s is not None or one.alone else replace(one, lost=True)
+            for one, known in zip(pulses, seen, strict=True)]  # fmt: skip
 
 
 def _track_of(contents: Contents, key: str, layout: Layout) -> Track:
@@ -161,7 +213,8 @@ def _track_of(contents: Contents, key: str, layout: Layout) -> Track:
 
 def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Pulse], tuple[str, ...], str]:
     """The pulses of sweeps that a row each says the ISI of, the columns that are not used, and whose they are."""
-    stated = replace(layout, alone="") if layout.alone is None and contents.empty_is_alone else layout
+    stated = replace(layout, where={name: said for name, said in layout.where.items() if name != emg.name})
+    stated = replace(stated, alone="") if layout.alone is None and contents.empty_is_alone else stated
     trials = named(contents.trials)
     if len(emg.stretches) != len(trials):
         what = f"{contents.source} does not say the ISI of each sweep"

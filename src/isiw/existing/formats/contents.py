@@ -179,7 +179,7 @@ class Track:
             remedy = "Export events in its place that say when it begins, or a trigger of two levels."
             raise InvalidValueError(what, remedy=remedy)
         spans_s = np.diff(sorted([*rises, *falls]))
-        if len(spans_s) > 2 and 0.5 < np.median(spans_s[0::2]) / np.median(spans_s[1::2]) < 2:
+        if len(spans_s) > 2 and 0.5 < np.quantile(spans_s[0::2], 0.75) / np.quantile(spans_s[1::2], 0.75) < 2:
             what = f"the trigger {self.name!r} is as long at one level as at the other: which of its edges are stimuli?"
             remedy = "Export events in its place, or a trigger that is short for each stimulus."
             raise InvalidValueError(what, got=f"{len(rises)} edges up and {len(falls)} down", remedy=remedy)
@@ -237,6 +237,7 @@ class Contents:
     trials: pd.DataFrame | None = None  # a row for each trial, or for each sweep
     pulse_at_s: float | None = None  # of sweeps whose ISIs are in trials, after the first sample
     empty_is_alone: bool = False  # whether a sweep without an ISI is TMS alone
+    unit_is_usual: bool = False  # whether the unit of the channels is that of the format, and not written there
     notes: tuple[str, ...] = ()  # what the operator should know of how it was read
 
     def with_bids(self, path: Path) -> Contents:

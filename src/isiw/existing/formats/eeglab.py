@@ -46,7 +46,7 @@ def read(path: Path, layout: Layout) -> Contents:
         tracks.append(Track(str(place.get("labels") or f"channel {n + 1}"), rate_hz, stretches, part, "uV", kind))
     events = events_of(timed((one for one in noted if one[0] != "boundary"), stretches, rate_hz))
     notes = () if layout.unit_of(EMG_UNITS) else (_ASSUMED,)
-    return Contents(path.name, tuple(tracks), events, notes=notes).with_bids(path)
+    return Contents(path.name, tuple(tracks), events, unit_is_usual=True, notes=notes).with_bids(path)
 
 
 def _beside(path: Path, name: str, count: int, channel: int, first: int, last: int) -> FloatArray:

@@ -55,7 +55,8 @@ def of_raw(raw: Any, source: str = "the recording") -> Contents:
         return raw.get_data(picks=[index], start=first, stop=last, verbose="ERROR")[0]
 
     tracks = tuple(_tracks(raw, stretches, part))
-    return Contents(source, tracks, with_codes(timed(noted, stretches, rate_hz), tracks))
+    is_usual = not getattr(raw, "_orig_units", None)
+    return Contents(source, tracks, with_codes(timed(noted, stretches, rate_hz), tracks), unit_is_usual=is_usual)
 
 
 def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
@@ -76,8 +77,8 @@ def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
         raise InvalidValueError(f"{source} do not hold the ISIs", expected=expected)
     events = events_of((name, at, lasts) for (name, at), lasts in noted.items())
     if epochs.metadata is None:
-        return Contents(source, tracks, events)
-    return Contents(source, tracks, events, epochs.metadata, zero_s, empty_is_alone=True)
+        return Contents(source, tracks, events, unit_is_usual=True)
+    return Contents(source, tracks, events, epochs.metadata, zero_s, empty_is_alone=True, unit_is_usual=True)
 
 
 def _tracks(held: Any, stretches: tuple[Stretch, ...], part: Callable[[int, int, int], Any]) -> Iterator[Track]:
