@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 
 from isiw.checks import Checked, Count, Positive, whole
 from isiw.lazy import torch
+from isiw.models.parametric.normal import log_standard
 from isiw.models.parametric.tensors import Tensor
 
 LogDensity = Callable[[Tensor], Tensor]
@@ -207,8 +208,7 @@ class Proposal:
         gammas = math.lgamma(0.5 * (T_DEGREES + d)) - math.lgamma(0.5 * T_DEGREES)
         constant = gammas - 0.5 * d * math.log(T_DEGREES * math.pi)
         student = constant - log_det - 0.5 * (T_DEGREES + d) * torch.log1p(squared / T_DEGREES)
-        prior = -0.5 * points.square().sum(-1) - 0.5 * d * math.log(2.0 * math.pi)
-        return torch.cat((prior.unsqueeze(0), student)) + self.shares.log().unsqueeze(-1)
+        return torch.cat((log_standard(points).unsqueeze(0), student)) + self.shares.log().unsqueeze(-1)
 
     def joined(self, other: Proposal, share: float) -> Proposal:
         """This mixture and the components of another one."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Annotated, Final, Literal, NamedTuple
 
 from isiw.checks import Checked, number
@@ -180,9 +180,10 @@ def levels(unknowns: Unknowns, isi_ms: Tensor) -> Tensor:
     return torch.where(isi_ms.isnan(), 0.0, torch.exp(-_EXPONENT * share.square()))
 
 
-def _nodes(like: Tensor) -> tuple[Tensor, Tensor]:
+@cache
+def _nodes(dtype: torch.dtype) -> tuple[Tensor, Tensor]:
     """Nodes of the noise on the input [SD], and their log weights, each of shape (q,)."""
-    nodes = torch.linspace(-NODE_REACH, NODE_REACH, NODES, dtype=like.dtype, device=like.device)
+    nodes = torch.linspace(-NODE_REACH, NODE_REACH, NODES, dtype=dtype)
     return nodes, torch.log_softmax(-0.5 * nodes.square(), dim=-1)
 
 
@@ -193,7 +194,7 @@ def _components(unknowns: Unknowns, level: Tensor, likelihood: Likelihood) -> _C
         saturation_mv, input_sd = u.saturation_mv.unsqueeze(-1), u.input_sd.unsqueeze(-1)
         share = (evoked_mv / saturation_mv).clamp(1e-9, 1.0 - 1e-9)
         drive = torch.sqrt(1.0 + input_sd.square()) * torch.special.ndtri(share)
-        x = drive + input_sd * _nodes(level)[0]
+        x = drive + input_sd * _nodes(level.dtype)[0]
         # The normal distribution function, faster than torch's own, which differs only if it is nearly 0.
         evoked_mv = saturation_mv * (0.5 + 0.5 * torch.erf(x * math.sqrt(0.5)))
     mean_mv = evoked_mv + u.floor_mv.unsqueeze(-1)
@@ -205,7 +206,7 @@ def _mixed(log_terms: Tensor, likelihood: Likelihood) -> Tensor:
     """Averaged over the nodes, shape (m, n)."""
     if likelihood != "input-noise":
         return log_terms.squeeze(-1)
-    return torch.logsumexp(log_terms + _nodes(log_terms)[1], dim=-1)
+    return torch.logsumexp(log_terms + _nodes(log_terms.dtype)[1], dim=-1)
 
 
 def _log_density(parts: _Components, log_mep: Tensor, likelihood: Likelihood) -> Tensor:
@@ -269,7 +270,7 @@ def draw_log_mep(
     """Draw natural logs of MEPs [mV], shape (m, n)."""
     parts = _components(unknowns, level, likelihood)
     if likelihood == "input-noise":
-        weights = _nodes(level)[1].exp().expand(level.numel(), -1)
+        weights = _nodes(level.dtype)[1].exp().expand(level.numel(), -1)
         node = torch.multinomial(weights, 1, generator=generator).view(*level.shape, 1)
         parts = _Components(*(part.expand(*level.shape, NODES).gather(-1, node) for part in parts))
     mean_mv, cv2 = (part.squeeze(-1) for part in parts)

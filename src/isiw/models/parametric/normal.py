@@ -1,4 +1,4 @@
-"""The normal distribution function between two ends, exact in either tail, and its logarithm.
+"""The standard normal density, and the distribution function between two ends, exact in either tail, as logarithms.
 
 `torch.special.ndtr` has no lower tail: in double precision it is 0 at -10, where 7.6e-24 is right. Wherever a logarithm
 or a ratio is taken of such a probability, it comes from here; the compiled engine has its like.
@@ -10,6 +10,12 @@ import math
 
 from isiw.lazy import torch
 from isiw.models.parametric.tensors import Tensor
+
+
+def log_standard(points: Tensor) -> Tensor:
+    """Log density of points (..., d) under independent standard normal variables, shape (...)."""
+    density: Tensor = -0.5 * points.square().sum(-1) - 0.5 * points.shape[-1] * math.log(2.0 * math.pi)
+    return density
 
 
 def log_between(low: Tensor, high: Tensor) -> Tensor:

@@ -13,6 +13,7 @@ from isiw.lazy import pyro, torch
 from isiw.models import parametric
 from isiw.models.parametric.importance import Effort, Modes, Proposal, WeightedDraws, importance_sample, worth
 from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, latent_names
+from isiw.models.parametric.normal import log_standard
 from isiw.models.parametric.tensors import Tensor, Trials
 from isiw.models.shared.draws import systematic
 
@@ -36,7 +37,8 @@ class WindowProgram:
 
     def __call__(self, trials: Trials) -> Unknowns:
         """Run the program."""
-        latents = pyro.sample("latents", self._latents())
+        standard = pyro.distributions.Normal(torch.zeros(self.latents, dtype=torch.double), 1.0)
+        latents = pyro.sample("latents", pyro.distributions.Independent(standard, 1))
         unknowns = self.unknowns(latents)
         for name in ("start_ms", "width_ms", "baseline_mv", "amplitude_mv"):
             pyro.deterministic(name, getattr(unknowns, name))
@@ -46,8 +48,7 @@ class WindowProgram:
 
     def log_density(self, latents: Tensor, trials: Trials) -> Tensor:
         """Log density of the program's trace for each of many latents (m, d), shape (m,)."""
-        prior: Tensor = self._latents().log_prob(latents)
-        return prior + self.log_likelihood(latents, trials)
+        return log_standard(latents) + self.log_likelihood(latents, trials)
 
     def log_likelihood(self, latents: Tensor, trials: Trials) -> Tensor:
         """Log likelihood of the trials under each of many latents (m, d), shape (m,)."""
@@ -56,11 +57,6 @@ class WindowProgram:
     def unknowns(self, latents: Tensor) -> Unknowns:
         """The unknowns that latents (..., d) stand for."""
         return self.prior.unknowns(latents, self.likelihood, self.space)
-
-    def _latents(self) -> pyro.distributions.Independent:
-        return pyro.distributions.Independent(
-            pyro.distributions.Normal(torch.zeros(self.latents, dtype=torch.double), 1.0), 1
-        )
 
     def _meps(self, unknowns: Unknowns, trials: Trials) -> parametric.MepLaw:
         return parametric.MepLaw(unknowns, trials.isi_ms, trials.isi_sd_ms, self.likelihood, present=self.present)

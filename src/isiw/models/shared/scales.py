@@ -43,8 +43,8 @@ class Scale(NamedTuple):
 
     def normal(self, z: Number) -> Number:
         """The quantity at some latents, same shape."""
-        found: Number = self.median + self.sd * z + self.tail * z**3
-        return found
+        linear: Number = self.median + self.sd * z
+        return linear + self.tail * z**3 if self.tail else linear
 
 
 def scale(what: str, given: object, *, positive: bool = True, tailed: bool = True) -> Scale:
