@@ -50,6 +50,7 @@ def reference() -> dict[str, str]:
     return dict(api.pages())
 
 
+@pytest.mark.slow
 def test_every_public_name_is_in_the_reference() -> None:
     described = set(re.findall(r"^(?:\.\. [\w:]+:: |``)(isiw[\w.]+)", "\n".join(reference().values()), re.MULTILINE))
     assert public() - described == set()

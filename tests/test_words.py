@@ -7,6 +7,8 @@ import re
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 PHRASES = re.compile(
     r"\b(?:(?:is|are|be|been|was|were) told|(?:is|are|was|were|been) believed|"
@@ -38,6 +40,7 @@ def test_no_page_has_one_of_the_worst_phrases() -> None:
     assert [each for each in lines if PHRASES.search(each[1]) or CONTINUING.search(each[1])] == []
 
 
+@pytest.mark.slow
 def test_no_message_has_one_of_the_worst_phrases() -> None:
     said = [(name(path), text) for path in SOURCES for text in read(path)[0]]
     assert [each for each in said if PHRASES.search(each[1]) or CONTINUING.search(each[1])] == []

@@ -112,6 +112,7 @@ def test_the_law_is_a_histogram_of_each_level_that_excludes_nothing() -> None:
     assert windows()[2].sum() == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_who_knows_the_law_finds_the_window(made_up: Path) -> None:
     rows = [RecordedSession(RecordedPerson(number, 5, made_up), LAW, 0, 40).rows() for number in range(8)]
     found = pd.DataFrame([row for session in rows for row in session]).groupby("pairs")["f1"].mean()

@@ -60,6 +60,7 @@ def test_an_error_is_a_message_and_exit_code_1(isiw: Command, arguments: list[st
     assert "Traceback" not in result.output
 
 
+@pytest.mark.slow
 def test_help_and_import_load_no_torch_and_are_fast() -> None:
     check = "import sys, isiw.cli; assert not {'torch', 'matplotlib', 'pandas', 'pydantic'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", check], check=True)  # noqa: S603

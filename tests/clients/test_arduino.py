@@ -27,9 +27,10 @@ from isiw.trials import Stimulus
 
 SPACE = isiw.DesignSpace(0, 120, reference="valve")
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("g++") is None or sys.platform == "win32", reason="needs g++ and pseudo-terminals"
-)
+pytestmark = [
+    pytest.mark.slow,  # the sketch is compiled for each board
+    pytest.mark.skipif(shutil.which("g++") is None or sys.platform == "win32", reason="needs g++ and pseudo-terminals"),
+]
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,6 @@ def device(board: Board) -> Iterator[Any]:
     device.unstage()
 
 
-@pytest.mark.slow
 def test_the_example_of_the_page_conforms_on_the_sketch(board: Board) -> None:
     check_device(lambda: device_of_the_page(board.address, 0.0), SPACE, timeout_s=2.0, iti_s=0.0, say=lambda _: None)
     assert [pin for pin, _ in board.rises] == ["valve", "trigger"] + ["trigger"] + ["valve", "trigger"] * 2 + ["valve"]
@@ -163,7 +163,6 @@ def test_a_line_without_end_is_no_line(board: Board) -> None:
         port.ask("7 DISARM", "7 DISARMED")
 
 
-@pytest.mark.slow
 def test_arming_is_for_two_seconds_at_most_and_for_one_stimulus(board: Board) -> None:
     with Port(board.address) as port:
         port.ask("1 ARM", "1 ARMED")

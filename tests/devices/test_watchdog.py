@@ -143,6 +143,7 @@ def test_a_check_kills_a_process_that_has_armed_and_says_how_long_the_device_sta
     assert any("that had armed rec was killed: disarmed after" in line for line in checked(lambda: device))
 
 
+@pytest.mark.slow
 def test_a_check_of_a_line_kills_a_process_that_has_armed() -> None:
     with PulsePeer().over_tcp() as address:
         info = INFO | {"simulated": True}

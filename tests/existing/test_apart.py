@@ -28,6 +28,7 @@ def read_here() -> None:
     """Here files are read as they always are: apart."""
 
 
+@pytest.mark.slow
 def test_a_table_is_read_by_another_process_and_known_by_its_content(tmp_path: Path) -> None:
     (tmp_path / "numpy.py").write_text("raise SystemExit('code beside the data was run')")
     (tmp_path / "P01.csv").write_text(HEAD + ROWS)

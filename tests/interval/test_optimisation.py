@@ -10,6 +10,7 @@ from isiw.errors import InvalidValueError
 from isiw.log.headers import Block
 
 
+@pytest.mark.slow
 def test_it_begins_with_evenly_spaced_intervals_and_finds_the_target() -> None:
     exact = LightSearch(timing_sd_ms=0.0, initial=6)
     times_ms = search_light(Block(2, 287.0, trials=40), seed=2, search=exact)

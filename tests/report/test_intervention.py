@@ -25,6 +25,7 @@ DELIVERED = tuple(Delivered(88.0 + place % 3, 10.0 * place, 0.1, probe=place % 1
 PULSES = visit(0, 2.0).pulses
 
 
+@pytest.mark.slow
 @pytest.mark.needs_pictures
 def test_a_page_shows_the_change_each_block_the_dose_and_the_window() -> None:
     window = [(0.0, 60.0, 120.0), (400.0, 70.0, 130.0)]
@@ -41,6 +42,7 @@ def test_a_page_shows_the_change_each_block_the_dose_and_the_window() -> None:
     assert "taken" in page.words  # the subject's code is text
 
 
+@pytest.mark.slow
 @pytest.mark.needs_pictures
 def test_a_page_shows_the_course_of_the_window_that_was_followed() -> None:
     course = [FollowedPair(1 + k, k // 25, 88.0 + k // 25, k % 10 == 0, 90.0, 80.0, 99.0, 0.9) for k in range(50)]
@@ -115,6 +117,7 @@ def test_an_intervention_that_is_not_over_says_so(tmp_path: Path) -> None:
     assert "Too few pulses" in page
 
 
+@pytest.mark.slow
 def test_a_concealed_change_waits_for_the_end_of_the_plan(tmp_path: Path) -> None:
     def stopping(update: SessionUpdate) -> None:
         if update.trial.index == 61:

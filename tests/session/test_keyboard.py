@@ -165,6 +165,7 @@ def events(operator: Operator) -> list[tuple[str, int | None]]:
     return [(event.kind, event.trial) for event in operator.record.events]
 
 
+@pytest.mark.slow
 def test_every_key_is_an_event_and_a_killed_and_resumed_session_has_them_all(operator: Operator) -> None:
     operator.sees("Keys: p pause")
     operator.let(0, 1)
@@ -193,6 +194,7 @@ def test_every_key_is_an_event_and_a_killed_and_resumed_session_has_them_all(ope
     assert [trial.told for trial in session.trials] == [True, True, False, True]
 
 
+@pytest.mark.slow
 def test_to_the_end_with_the_terminal_given_back(operator: Operator) -> None:
     operator.sees("Keys: p pause")
     assert not operator.keeps_its_settings
@@ -202,6 +204,7 @@ def test_to_the_end_with_the_terminal_given_back(operator: Operator) -> None:
     assert operator.ends() == 0
 
 
+@pytest.mark.slow
 def test_q_ends_a_paused_session_which_can_be_resumed(operator: Operator) -> None:
     operator.let(0)
     operator.press("p")
@@ -216,6 +219,7 @@ def test_q_ends_a_paused_session_which_can_be_resumed(operator: Operator) -> Non
 UP, F2, F3, ALT_R = "\x1b[A", "\x1bOQ", "\x1bOR", "\x1br"
 
 
+@pytest.mark.slow
 def test_arrows_and_function_keys_decide_nothing(operator: Operator) -> None:
     operator.let(0, 1)
     operator.press("p")
@@ -230,6 +234,7 @@ def test_arrows_and_function_keys_decide_nothing(operator: Operator) -> None:
     operator.waits(lambda: operator.armed, "arming")
 
 
+@pytest.mark.slow
 def test_ctrl_c_disarms_pauses_and_asks_and_twice_ends(operator: Operator) -> None:
     operator.let(0)
     operator.press(CTRL_C)
@@ -248,6 +253,7 @@ def test_ctrl_c_disarms_pauses_and_asks_and_twice_ends(operator: Operator) -> No
     assert [kind for kind, _ in events(operator)] == ["pause"] * 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["p", CTRL_C])
 def test_a_terminal_that_takes_no_output_delays_no_disarming(operator: Operator, key: str) -> None:
     operator.let(0)

@@ -44,6 +44,7 @@ def test_at_the_isi_that_leaves_just_enough_rest_a_trial_is_judged(rate_hz: floa
     assert trial.mep_mv == pytest.approx(0.1, abs=0.03) or isi_ms == 0.0
 
 
+@pytest.mark.slow
 @given(
     rate_hz=st.floats(500.0, 50_000.0),
     before_ms=st.floats(-40.0, 300.0),

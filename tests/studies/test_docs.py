@@ -28,6 +28,7 @@ def test_the_study_is_valid() -> None:
     assert study.units()[1].key == "nr.recruitment.00000"
 
 
+@pytest.mark.slow
 def test_the_example_in_python_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -75,6 +75,7 @@ def test_it_conforms_also_with_an_accelerometer_on_a_stream_of_its_own() -> None
     assert rows["judged"] == "accepted, accepted, accepted, accepted"
 
 
+@pytest.mark.slow
 def test_a_sweep_is_where_its_timestamps_are_and_what_cannot_confirm_it_counts_as_armed() -> None:
     with staged({"1": "refuses"}) as made:
         sweep = made.deliver(Stimulus(0, 50.0), 5.0)
@@ -147,6 +148,7 @@ def test_a_fault_is_told_as_what_it_is_and_disarms(
     assert type(afterwards) is NotDelivered
 
 
+@pytest.mark.slow
 def test_what_is_not_as_configured_is_not_staged() -> None:
     with rig({"arm": "cannot arm"}) as name:
         emg = {"stream": f"{name}-emg", "unit": "mV", "rate_hz": 5000.0, "column": 2}
@@ -171,6 +173,7 @@ def test_without_its_streams_staging_fails_in_time_and_says_which_are_missing() 
     made.unstage()
 
 
+@pytest.mark.slow
 def test_stopping_from_another_thread_ends_a_delivery_that_waits() -> None:
     errors: list[BaseException | None] = []
     with rig({"0": "no echo"}) as name:
