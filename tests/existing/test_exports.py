@@ -40,6 +40,10 @@ def test_other_measures_and_what_is_relative_are_known_by_more_names(name: str) 
         ("Amplitudes relative to TMS alone", "to be relative"),
         ("z-scored MEPs", "to be relative"),
         ("log-transformed MEP amplitudes", "to be relative"),
+        ("All MEPs divided by their mean in TS", "to be relative"),
+        ("Amplitude: conditioned / test", "to be relative"),
+        ("amplitudes averaged over 4 pulses", "to be means of several trials"),
+        ("omit #4 #9", "which trials do not count"),
         ("Amplituden bezogen auf TMS allein", "to be relative"),
         ("MEP amplitudes (x10)", "to be multiplied"),
         ("MEP in 10 µV", "to be multiplied"),
@@ -90,12 +94,13 @@ def test_isis_of_a_trigger_or_up_to_the_tap_are_asked_about(name: str, says: str
 @pytest.mark.parametrize(
     "remark",
     ["repeat", "repeated", "delete", "skip", "ignore", "omitted", "wiederholt", "nicht auswertbar", "EMG not relaxed",
-     "coil slipped, do not use", "eliminare"],
+     "coil slipped, do not use", "eliminare", "not valid", "no good", "excl.", "stimulator error", "coil off"],
 )  # fmt: skip
 def test_more_remarks_leave_a_trial_out(remark: str) -> None:
     with pytest.raises(IsiwError, match=r"row 5 of the column 'note' .* says that the trial does not count"):
         read_people(table(note=few(remark, "")), EMPTY_IS_ALONE)
-    assert len(trials_of(read_people(table(note=few("not repeated", "")), EMPTY_IS_ALONE))) == 48
+    for usual in ("not repeated", "not bad", "no artefact", "ok, no artefact"):
+        assert len(trials_of(read_people(table(note=few(usual, "")), EMPTY_IS_ALONE))) == 48
 
 
 @pytest.mark.parametrize(
@@ -134,10 +139,12 @@ def test_amplitudes_that_are_cut_off_are_asked_about(meps: Any, says: str) -> No
 
 @pytest.mark.parametrize("label", ["Mean block {}", "MW B{}", ""])
 def test_means_between_blocks_are_no_tms_alone(label: str) -> None:
-    parts = [table(label="").iloc[first : first + 24] for first in (0, 24)]
-    for n, part in enumerate(parts):
-        parts[n] = pd.concat([part, pd.DataFrame([{"MEP (mV)": part["MEP (mV)"].mean().round(5),
-                                                   "label": label.format(n + 1)}])])  # fmt: skip
+    made, parts = table(label=""), list[pd.DataFrame]()
+    for n, first in enumerate((0, 24)):
+        mean = pd.DataFrame(
+            {"MEP (mV)": [round(float(MEPS[first : first + 24].mean()), 5)], "label": label.format(n + 1)}
+        )
+        parts += [made.iloc[first : first + 24], mean]
     with pytest.raises(IsiwError, match=r"row 25 .*(is none of a trial|seems to be a mean)"):
         read_people(pd.concat(parts, ignore_index=True), EMPTY_IS_ALONE)
 

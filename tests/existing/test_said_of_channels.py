@@ -113,7 +113,7 @@ def named(said: list[float], before_s: float) -> Any:
 def test_isis_that_events_name_are_those_between_tap_and_pulse(before_s: float) -> None:
     require_as_written(read_people(named([*ISIS_MS], before_s), KNOWN)[0])
     require_as_written(read_people(named([isi - 6 for isi in ISIS_MS], before_s), KNOWN)[0])  # a hammer is late
-    for wrong in ([30, 60, 115, 120, 45], [*ISIS_MS[1:], ISIS_MS[0]]):
+    for wrong in ([30.0, 60, 115, 120, 45], [*ISIS_MS[1:], ISIS_MS[0]]):
         with pytest.raises(IsiwError, match=r"names another ISI than .*--where \"event=\*\""):
             read_people(named(wrong, before_s), KNOWN)
         require_as_written(read_people(named(wrong, before_s), KNOWN.saying(where=EVERY))[0])

@@ -66,12 +66,12 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
             ):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
-    title = f"{source}\n{frame.attrs.get('title', '')}"
+    heading = f"{source}\n{frame.attrs.get('title', '')}"
     if mep.name not in layout.where:
         bare = [row for row, cells in enumerate(zip(mep.texts, isi.texts, strict=True)) if not any(cells)]
         below = [", ".join(cell for cells in others.values() if isinstance(cell := cells[row], str)) for row in bare]
-        require_title("\n".join([title, *below]), mep, layout.reference)
-    title = TITLES_OF_MEANS.search(words_of(title)) if once else None
+        require_title("\n".join([heading, *below]), mep, layout.reference)
+    title = TITLES_OF_MEANS.search(words_of(heading)) if once else None
     if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"

@@ -113,7 +113,7 @@ def joined(events: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     """Events, of which those have one name that a marker such as `TMS*` says; what each was called is kept."""
     names = events["name"].astype(str)
     for stated in (one for one in layout.markers.values() if "*" in one and not names.eq(one).any()):
-        names = names.where([not fnmatchcase(_plain(name), _plain(stated)) for name in names], stated)
+        names = names.map(lambda name, one=stated: one if fnmatchcase(_plain(name), _plain(one)) else name)
     return events.assign(name=names, called=events["name"])
 
 
@@ -165,7 +165,8 @@ def _require_named_isis(pulses: Sequence[Pulse], events: pd.DataFrame, layout: L
     """Raise if names of events, such as ISI 60, say ISIs that are not those of the trials, but for a delay of all."""
     times_s, off_ms = events["onset"].to_numpy(), dict[str, float]()
     for pulse, before in zip(pulses, _before(pulses, events, layout), strict=True):
-        rows = events[np.abs(times_s - pulse.at_s) < _TWICE_S].to_dict("records")
+        rows = [{str(key): cell for key, cell in row.items()}
+                for _, row in events[np.abs(times_s - pulse.at_s) < _TWICE_S].iterrows()]  # fmt: skip
         texts = [*before, *(str(row.get("called", row["name"])) for row in rows)]
         said_ms = {_ms_of(found): found[0].strip() for text in texts if (found := _ISI.search(text))}
         said_ms |= {isi_ms: f"ISI {isi_ms:g}" for row in rows for isi_ms in isis_of(row)}

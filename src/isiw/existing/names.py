@@ -21,14 +21,14 @@ TITLES_OF_MEANS: Final = re.compile(
     r"\b(means?|averages?|averaged|avg|mittelwerte?|moyennes?|promedios?|medi[ae]|gemiddelden?)\b"
 )  # what the names of files and sheets, and titles, say of means
 _ORIGINS: Final = {
-    "impact": r"valve|ventil|\bcommand|solenoid|vanne|v[aá]lvula|valvola|\bklep|actuator",
+    "impact": r"valve|ventil|\bcommand|\bcmd\b|solenoid|vanne|v[aá]lvula|valvola|\bklep|actuator",
     "valve": r"\b(impact|hit|contact|aufprall|acceler)",
 }  # from another event
 _BASES: Final = "(control|base|baseline|mean|unconditioned|kontrolle|tests?|ts|tms alone|single|m ?max)"
 _SCALED: Final = (
     r"%|\bper ?c(ent)?|\bpct\b|pro[zc]ent|p(our|or)cent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|"
     r"\brel(ati\w*)?\b|\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|"
-    r"\bdb\b|\brank|[\^√]|\bresid|fitted|predict|smooth|winsor|detrend|adjusted|\bcent(ere|re)d|standardi[sz]|"
+    r"\bdb\b|\brank|[\^√]|\bresid|\bfraction\b|box.?cox|fitted|predict|smooth|winsor|detrend|adjusted|\bcent(ere|re)d|standardi[sz]|"
     rf"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|([/÷]|\b(x|times|div|by|vs|re)\b) ?{_BASES}\b"
 )
 RELATIVE: Final = (
@@ -39,7 +39,7 @@ WHOLE: Final = r"peak\W*(to|2)?\W*peak|\bp\W?(2|to|t)?\W?p\b|max\w*\W+(to\W+)?mi
 _HALVES: Final = r"\b(bas[ei]|zero|0|onset|null)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b"
 _MEASURES: Final = (
     rf"{_HALVES}|\b[aá]rea\b|\baire\b|fläche|\bauc\b|\brms\b|integra|\biemg\b|rectif|\brect\b(?!\W*(fem|abd))|gleichger|"
-    r"\b(envelope|arv|mav|turns|power|counts|adc|adu|lsb)\b|"
+    r"\b(envelope|arv|mav|turns|power|energy|snr|counts|adc|adu|lsb)\b|"
     r"latenc|[\[(] ?(counts?|adc|adu|bits?|lsb|digits?|units?|[cm]m|kv|pu|sd|au)\b|"
     r"\b[mµμu]?v([²/]| ?[*·×] ?m?s\b|m?s\b)"
 )
@@ -52,7 +52,7 @@ _FACTOR: Final = (
 )  # such as x10 ms, 1/10 mV, 10^-1 or 0.1 ms
 _NUMBERS: Final = (
     r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe|rank|log\d*|ln|z)\b|"
-    r"[\[(] ?([cd]s|ticks?|steps?|pts?|points?|min|hz|deg|a\.? ?u|frames?|%)\b"
+    r"[\[(] ?([cd]s|ticks?|steps?|samples?|pts?|points?|min|hz|deg|a\.? ?u|frames?|%)\b"
 )
 _TAP: Final = r"(tap|cs|impact|hammer|hit|schlag|conditioning|pns|electrical|cond)"
 _OTHERWISE: Final = (
@@ -80,18 +80,20 @@ _AFTER: Final = r"\b(from|after|since|relative to|ab|nach|seit|depuis|desde|dall
 _ANY_TITLES: Final = {
     rf"(%|per ?cent|prozent|pour ?cent|por ?ciento) (of|vom|von|der|de|du|del|van) ?(the )?{_BASES}|"
     r"\bnormali[sz]ed\b|\bnormiert|\bmeps? ?/": "to be relative",
-    r"\b(averages?|means?|mittel\w*|moyennes?) (of|von|aus|de) (\d+|two|three|four|five|six|eight|ten|several) "
+    r"\b(averages?|averaged|means?|mittel\w*|gemittelt|moyennes?) (of|over|across|von|aus|über|de) "
+    r"(\d+|two|three|four|five|six|eight|ten|several) "
     r"(meps|sweeps|trials|pulses|stimuli|responses)": "to be means of several trials",
 }  # what a title says in whatever clause
 _TITLES: Final = {
-    r"%|per ?cent|prozent|pour ?cent|por ?ciento|\bz-? ?scor|\blog\w*[- ](transf|arithm|mep|amp)|\bratios?\b|"
+    r"%|per ?cent|prozent|pour ?cent|por ?ciento|\bz-? ?scor|\blog\w*[- ](transf|of|mep|amp)|\blogarithm|\bratios?\b|"
+    r"divided by|geteilt durch|"
     r"\brel(ative)? to\b(?! (the )?(\w+ )?(impact|tap|hit|valve|pulse|onset|stimul))|\bmultiples? of\b|\bfold\b|"
     rf"bezogen auf|par rapport|\bm ?max\b|[/÷] ?{_BASES}\b": "to be relative",
     rf"\bmep areas?\b|rectified|{_HALVES}": "to be of another measure",
     r"[x×*] ?10+\b|\btimes 10+\b|multiplied|\bin (10+|0[.,]\d+) ?[mµμun]?v\b": "to be multiplied",
 }  # what a title says of amplitudes in the same clause
 _LEFT_OUT: Final = (
-    r"(reject\w*|exclu\w*|bad|invalid|discard\w*|art[ei]fa[ck]t\w*|outliers?|omitted|removed|skipped|dropped|verworfen\w*|"
+    r"(reject\w*|exclu\w*|bad|invalid|discard\w*|art[ei]fa[ck]t\w*|outliers?|omit(ted)?|removed|skip(ped)?|drop(ped)?|verworfen\w*|"
     r"ausgeschlossen\w*|ungültig\w*|rejet\w*|scartat\w*|esclus\w*|rechazad\w*|descartad\w*|uitgesloten)"
 )
 _NUMBER: Final = r"[1-9]\d*\b(?!\.\d| ?(%|of\b|von\b|trials?|sweeps?|[mµμu]?v\b|m?s\b|sd\b|hz))"
@@ -99,7 +101,7 @@ _LISTED: Final = re.compile(
     rf"\b{_LEFT_OUT}\b\W*((in|of|trials?|sweeps?|frames?|stimul\w+|nr|no|versuche?|essais?)\b\W*)*{_NUMBER}|"
     rf"\b(trials?|sweeps?|versuche?|nr|essais?)\W+{_NUMBER}(\W+(and |und |et )?\d+)*\W+(\w+\W+){{0,2}}{_LEFT_OUT}\b"
 )  # numbers of trials that do not count
-_CLAUSES: Final = re.compile(r"[\n;]|[.,:](?=\s)")
+_CLAUSES: Final = re.compile(r"[\n;]|[.,](?=\s)")
 _WORDS: Final = 4  # in a longer remark bad may be of something
 
 
@@ -183,5 +185,8 @@ def is_verdict(text: str) -> bool:
     phrases = [word for word in WORDS["left out"] if " " in word and word in said]  # such as "do not use"
     bare = said.replace(phrases[0], " ") if phrases else said
     words = {*(re.findall(r"\w+", bare) if said.count(" ") < _WORDS else ())}
-    is_said = bool(phrases) or not words.isdisjoint(WORDS["left out"])
-    return said in WORDS["left out"] or (is_said and words.isdisjoint(WORDS["no"]))
+    known = WORDS["left out"] | WORDS["flags"]
+    if words.isdisjoint(known) and not (words.isdisjoint(WORDS["no"]) or words.isdisjoint(WORDS["counted"])):
+        return True  # such as "not valid"
+    is_said = bool(phrases) or not words.isdisjoint(known)
+    return said in known or (is_said and words.isdisjoint(WORDS["no"]))
