@@ -43,6 +43,7 @@ def lost(person: Delivered) -> list[int]:
 @pytest.mark.parametrize(
     "name",
     ["FCR ADU", "FCR (counts)", "iEMG FCR", "FCR detrended", "FCR smoothed", "FCR normalised", "FCR %MVC", "FCR log",
+     "FCR abs", "FCR_RMS50", "FCR TKEO",
      "EMG z-score"],
 )  # fmt: skip
 def test_a_channel_that_is_not_emg_as_it_was_recorded_has_many_names(name: str) -> None:
@@ -78,7 +79,7 @@ def test_a_channel_that_is_marked_as_bad_or_filtered_is_asked_about(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("unit", "is_asked"), [("counts", True), ("N", True), ("g", True), ("", False), ("n/a", False)]
+    ("unit", "is_asked"), [("counts", True), ("N", True), ("g", True), ("uV RMS", True), ("", False), ("n/a", False)]
 )
 def test_a_unit_of_no_voltage_is_not_overruled_in_silence(unit: str, is_asked: bool, tmp_path: Path) -> None:  # noqa: FBT001
     path, layout = as_edf(tmp_path, unit), KNOWN.saying(units=("uV",))
@@ -89,7 +90,9 @@ def test_a_unit_of_no_voltage_is_not_overruled_in_silence(unit: str, is_asked: b
     require_as_written(read_people(path, layout)[0])
 
 
-@pytest.mark.parametrize("remark", ["repeat", "coil slipped, do not use", "LostSamples: 234", "Buffer Overflow"])
+@pytest.mark.parametrize(
+    "remark", ["repeat", "coil slipped, do not use", "LostSamples: 234", "Buffer Overflow", "aborted"]
+)
 def test_more_remarks_beside_trials_are_asked_about(remark: str) -> None:
     noted = with_events(lambda rows: [*rows, (5.3, remark)])
     with pytest.raises(IsiwError, match="says that a trial does not count"):
@@ -113,6 +116,7 @@ def named(said: list[float], before_s: float) -> Any:
 def test_isis_that_events_name_are_those_between_tap_and_pulse(before_s: float) -> None:
     require_as_written(read_people(named([*ISIS_MS], before_s), KNOWN)[0])
     require_as_written(read_people(named([isi - 6 for isi in ISIS_MS], before_s), KNOWN)[0])  # a hammer is late
+    require_as_written(read_people(named([1, 2, 3, 4, 5], before_s), KNOWN)[0])  # of conditions
     for wrong in ([30.0, 60, 115, 120, 45], [*ISIS_MS[1:], ISIS_MS[0]]):
         with pytest.raises(IsiwError, match=r"names another ISI than .*--where \"event=\*\""):
             read_people(named(wrong, before_s), KNOWN)
@@ -135,6 +139,7 @@ def test_events_epochs_and_intervals_that_a_file_marks_do_not_count(tmp_path: Pa
         ["onset", "duration", "trial_type"], axis=1
     )
     for column, cells in (("artifact", [int(n == 5) for n in range(len(events))]),
+                          ("quality", ["poor" if n == 5 else "good" for n in range(len(events))]),
                           ("status", ["bad" if n == 5 else "ok" for n in range(len(events))])):  # fmt: skip
         events.assign(**{column: cells}).to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)
         assert lost(read_people(path, KNOWN)[0]) == [2]
@@ -169,7 +174,8 @@ def test_what_matlab_has_beside_sweeps_and_where_these_begin_is_asked_about(tmp_
     assert [trial.mep_mv for trial in person.trials] == pytest.approx(MEPS_MV, rel=0.01)
     with pytest.raises(IsiwError, match=r"come later by as much as their ISIs are longer.*about the pulse"):
         read_people(sweeps(isis_ms), layout)
-    for more, says in (({"gain": 1000.0}, "'gain' of P01.mat says a factor"), ({"badsweeps": 3}, "not as long")):
+    for more, says in (({"gain": 1000.0}, r"'gain' of P01\.mat says a factor"), ({"badsweeps": 3}, "not as long"),
+                       ({"note": "EMG rectified"}, "not EMG as it was recorded")):  # fmt: skip
         with pytest.raises(IsiwError, match=says):
             read_people(sweeps(**more), layout)
     with pytest.raises(IsiwError, match=r"got 'V in one place|cannot be in|says another unit"):

@@ -163,7 +163,7 @@ def _require_no_verdicts(events: pd.DataFrame, at_s: FloatArray, layout: Layout,
 
 def _require_named_isis(pulses: Sequence[Pulse], events: pd.DataFrame, layout: Layout, source: str) -> None:
     """Raise if names of events, such as ISI 60, say ISIs that are not those of the trials, but for a delay of all."""
-    times_s, off_ms = events["onset"].to_numpy(), dict[str, float]()
+    times_s, off_ms, all_ms = events["onset"].to_numpy(), dict[str, float](), set[float]()
     for pulse, before in zip(pulses, _before(pulses, events, layout), strict=True):
         rows = [{str(key): cell for key, cell in row.items()}
                 for _, row in events[np.abs(times_s - pulse.at_s) < _TWICE_S].iterrows()]  # fmt: skip
@@ -172,9 +172,12 @@ def _require_named_isis(pulses: Sequence[Pulse], events: pd.DataFrame, layout: L
         said_ms |= {isi_ms: f"ISI {isi_ms:g}" for row in rows for isi_ms in isis_of(row)}
         if pulse.isi_s is not None and len(said_ms) == 1:
             ((isi_ms, text),) = said_ms.items()
+            all_ms.add(isi_ms)
             off_ms[f"{text!r} at {pulse.at_s:.3f} s"] = 1e3 * pulse.isi_s - isi_ms
     usual_ms = float(np.median([*off_ms.values()])) if len(off_ms) >= _FEW else 0.0
-    for name, ms in off_ms.items() if len(off_ms) >= _FEW and EVENT not in layout.where else ():
+    are_numbers = sorted(all_ms) == [*range(1, len(all_ms) + 1)]  # of conditions
+    is_asked = len(off_ms) >= _FEW and not are_numbers and EVENT not in layout.where
+    for name, ms in off_ms.items() if is_asked else ():
         if abs(ms - usual_ms) > _ODD_MS:
             what = f"an event of {source} names another ISI than the one between its tap and its pulse"
             remedy = f'Correct the events; if their names are wrong, say --where "{EVENT}={ALL}".'

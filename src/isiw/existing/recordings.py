@@ -192,7 +192,7 @@ def _unit_of(emg: Track, contents: Contents, layout: Layout) -> tuple[str, tuple
     if (
         known == unit
         or is_missing(emg.unit)
-        or (named and known is None)
+        or (len(named) > 1 and known is None)
         or emg.unit.strip().casefold() in WORDS["unknown"]
     ):
         return unit, ()

@@ -53,12 +53,16 @@ def read(path: Path, layout: Layout) -> Contents:
             texts = [(str(text).lstrip("#* "), at, 0.0) for at, text in enumerate(frame[name]) if not is_missing(text)]
         else:
             values, kind = _numbers(frame, name, layout, source), "stim" if key in MARKERS else ""
-            said = "\n".join(line for line in head.splitlines() if re.search(r"(?i)\bemg\b", line) and key == "emg")
             track = Track.of_values(name, rate_hz, stretches, values, unit_of(name, frame), kind)
-            tracks.append(replace(track, said=said))
+            tracks.append(replace(track, said=of_emg(head) if key == "emg" else ""))
     rows = timed(texts, stretches, rate_hz)
     rows += [("sweep", one.start_s, one.samples / rate_hz) for one in stretches if len(blocks) > 1]
     return Contents(source, tuple(tracks), events_of(rows))
+
+
+def of_emg(text: str) -> str:
+    """The lines of a text that are of EMG."""
+    return "\n".join(line for line in text.splitlines() if re.search(r"(?i)\bemg\b", line))
 
 
 def required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:

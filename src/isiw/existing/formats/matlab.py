@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,7 @@ def read(path: Path, layout: Layout) -> Contents:
     flat = (sweeps if sweeps.shape[0] == count else sweeps.T).ravel()
     stretches = parted(range(0, flat.size, flat.size // count), flat.size, rate_hz)
     track = Track.of_values(name, rate_hz, stretches, flat, quantities.unit_of(name, beside))
+    track = replace(track, said=columns.of_emg(beside.attrs["title"]))
     return Contents(source, (track,), trials=beside, pulse_at_s=pulse_at_ms / 1e3)
 
 
