@@ -52,7 +52,7 @@ _FACTOR: Final = (
 )  # such as x10 ms, 1/10 mV, 10^-1 or 0.1 ms
 _NUMBERS: Final = (
     r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe|rank|log\d*|ln|z)\b|"
-    r"[\[(] ?([cd]s|ticks?|steps?|samples?|pts?|points?|min|hz|deg|a\.? ?u|frames?|%)\b"
+    r"[\[(] ?([cd]s|ticks?|steps?|samples?(?= ?@)|pts?|points?|min|hz|deg|a\.? ?u|frames?|%)\b"
 )
 _TAP: Final = r"(tap|cs|impact|hammer|hit|schlag|conditioning|pns|electrical|cond)"
 _OTHERWISE: Final = (
