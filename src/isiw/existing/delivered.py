@@ -48,6 +48,7 @@ class Delivered:
         conditioning: the conditioning stimulus.
         simulated: true if nobody was stimulated: the person is simulated.
         units: the units in which ISIs and amplitudes are stated where they are from.
+        units_by: the column of the ISIs, and that of the amplitudes or the channel, if it says its unit itself.
         unused: the columns of a table of which nothing was read.
         notes: what the operator should know of how they were read.
         files: the SHA-256 of each file that was read, by its name.
@@ -70,6 +71,7 @@ class Delivered:
     conditioning: Conditioning = "tap"
     simulated: bool = False
     units: tuple[str, str] = ("ms", "mV")
+    units_by: tuple[str, str] = ("", "")
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
@@ -131,7 +133,9 @@ class Delivered:
             self._refuse_unit("amplitudes", "mep", f"{usual:.3g} {of_meps} in the median", of_meps, fits)
 
     def _refuse_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> NoReturn:
-        said = f"If they are in {fits[0]}, say --unit {fits[0]}; if" if fits else "If"
+        by = self.units_by[key == "mep"]
+        too = f' and --where "{by}=*", since its name or header says another' if by else ""
+        said = f"If they are in {fits[0]}, say --unit {fits[0]}{too}; if" if fits else "If"
         other = "channel holds the EMG, say --channel emg" if self.sweeps else f"column holds them, say --column {key}"
         what = f"the {what} of {self.named} cannot be in {stated}"
         raise InvalidValueError(what, got=got, remedy=f"{said} another {other}=NAME.")

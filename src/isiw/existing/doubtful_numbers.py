@@ -12,8 +12,8 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import LONGEST_ISI_MS
-from isiw.existing.doubts import ALL, RELATIVE, WHOLE, words_of
 from isiw.existing.layout import COLUMNS, EMG_UNITS, letters, unit_named
+from isiw.existing.names import ALL, RELATIVE, WHOLE, words_of
 from isiw.findings import AMPLITUDE_MV
 from isiw.types import FloatArray
 
@@ -30,12 +30,15 @@ _OF_REST: Final = (  # what says of EMG that it is no MEP, or of a number that i
 )
 _WITH, _ITS_HALF, _EXACT = 0.8, 0.7, 0.02  # halves correlate so with amplitudes, and are seldom a larger share of them
 _FEW, _FEWEST = 3, 12  # in a table with fewer rows ISIs may come again by chance
+_LONG_BEFORE_MS: Final = 50.0  # no pulse is given so long before the tap
+_NO_MEP: Final = {"none", "n.d."}  # in an amplitude's place
 _NEAR_MS, _ALIKE = (1.0, 25.0), 0.98  # so far from each other are ISIs that were asked and measured, and so alike
 
 
 def require_plain_numbers(columns: Columns) -> None:
     """Raise if the numbers of ISIs and amplitudes seem to be something else, in two units, or of each row twice."""
-    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each, _require_absolute, _require_whole):
+    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each, _require_absolute, _require_uncut,
+                  _require_whole):  # fmt: skip
         doubt(columns)
 
 
@@ -65,7 +68,12 @@ def _require_isis(columns: Columns) -> None:
         apart = odd <= 0 or odd > 2 * max(others)
         frequent = apart and (times[odd] >= 2 * max(others.values()) or _is_named(columns, odd))
         frequent |= times[odd] >= 2 * _FEW and max(others.values()) < _FEW and len(others) >= _FEWEST
-        if frequent or odd in {-1, -9, -99, -999, 99, 999} or odd > max(499.0, 2 * max(others)):
+        if (
+            frequent
+            or odd in {-1, -9, 99, 999}
+            or (odd < -_LONG_BEFORE_MS and len({*before}) == 1)
+            or odd > max(499.0, 2 * max(others))
+        ):
             what = f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone"
             remedy = f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never."
             raise InvalidValueError(what, expected="what an ISI is, and what is TMS alone", remedy=remedy)
@@ -103,6 +111,7 @@ def _require_one_column_each(columns: Columns) -> None:
     isi, mep, rows = columns["isi"], columns["mep"], columns.paired
     isis, once = isi.numbers[rows], len({isi.text(row) for row in rows}) == len(rows)
     stems = {name: letters(name).rstrip("0123456789") for name in (isi.name, mep.name, *columns.beside)}
+    stems = {name: stem if len(stem) > 1 else "" for name, stem in stems.items()}  # such as a, b and c
     a_row_each = once and list(stems.values()).count(stems[mep.name]) > 2  # or else MEP2 is that of another muscle
     alike = [isi.name, *([mep.name] if a_row_each and mep.name else [])]
     is_stated = bool(columns.layout.columns.keys() & {"isi", "asked"}) or "asked" in columns.of
@@ -121,6 +130,9 @@ def _require_one_unit(columns: Columns) -> None:
     """Raise if some numbers cannot be what they are, are about a thousand times the others, and none lies between."""
     mep, codes = columns["mep"], {"99", "999", "9999"} if columns["mep"].name not in columns.layout.where else ()
     coded = [row for row in columns.rows if mep.text(row).removesuffix(".0") in codes]
+    words = {row: cell.strip() for row in columns.rows if isinstance(cell := mep.cells[row], str)}
+    if said := [row for row, word in words.items() if word.casefold() in _NO_MEP and word != "None"]:
+        raise mep.refused(said[0], "may say that there was no MEP, or that it is not known", mep.remedy)
     if len(coded) >= _FEW and len({mep.text(row) for row in coded}) == 1:
         remedy = f'If it does, leave these cells empty; if not, say --where "{mep.name}={ALL}".'
         raise mep.refused(coded[0], "may stand for no amplitude", remedy)
@@ -156,6 +168,20 @@ def _require_absolute(columns: Columns) -> None:
             remedy = "Name the column of the amplitudes themselves: --column mep=NAME; if these are, say --where "
             expected, remedy = "peak-to-peak amplitudes in mV, µV or V", f'{remedy}"{mep.name}={ALL}".'
             raise mep.doubted(f"seems to be relative: its {what} is {one:g}", None, remedy, expected)
+
+
+def _require_uncut(columns: Columns) -> None:
+    """Raise if the largest amplitude, or the smallest, comes again and again, as of a saturated amplifier."""
+    mep = columns["mep"]
+    rows = [row for row in columns.rows if columns.lost(row) is None and not columns.tap_alone(row)]
+    times = Counter(number for row in rows if (number := mep.number(row)))
+    for odd, is_what in ((max(times, default=0.0), "saturated"), (min(times, default=0.0), "below a limit")):
+        usual = max((count for number, count in times.items() if number != odd), default=len(rows))
+        if len(rows) >= _FEWEST and times[odd] >= _FEW * usual and mep.name not in columns.layout.where:
+            remedy = "Write 0 for an MEP below the limit, and leave the cell of a saturated one empty; if all are as "
+            remedy += f'they were measured, say --where "{mep.name}={ALL}".'
+            got = f"{times[odd]} times {odd / mep.factor:g}"
+            raise mep.doubted(f"has amplitudes that seem to be {is_what}", got, remedy)
 
 
 def _require_whole(columns: Columns) -> None:

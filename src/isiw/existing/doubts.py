@@ -7,7 +7,6 @@ import re
 import statistics
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from itertools import chain, groupby, pairwise
 from operator import itemgetter
@@ -18,91 +17,41 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import Delivered
-from isiw.existing.layout import COLUMNS, WORDS, Layout, letters, plain
+from isiw.existing.layout import WORDS, Layout, letters, plain
+from isiw.existing.names import (
+    ALL,
+    MEANS,
+    TITLES_OF_MEANS,
+    is_verdict,
+    key_of_flags,
+    require_title,
+    says_only,
+    words_of,
+)
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
-from isiw.types import FloatArray, Reference
+from isiw.types import FloatArray
 
 if TYPE_CHECKING:
     from isiw.existing.quantities import Columns
 
-ALL: Final = "*"  # what `where` says of a column whose values are to be analysed together
-_MEANS: Final = re.compile(
-    r"means?|average|avg|median|mittel(wert)?|moyen(ne)?s?|promedios?|\bmedi[ae]\b|gemiddelden?|\bn ?= ?\d+"
-)
-_TITLES: Final = re.compile(
-    r"\b(means?|averages?|averaged|avg|mittelwerte?|moyennes?|promedios?|medi[ae]|gemiddelden?)\b"
-)  # what the names of files and sheets, and titles, say of means
-_ORIGINS: Final = {
-    "impact": r"valve|ventil|\bcommand|solenoid|vanne|v[aá]lvula|valvola|\bklep|actuator",
-    "valve": r"\b(impact|hit|contact|aufprall|acceler)",
-}  # from another event
-_BASES: Final = "(control|base|baseline|mean|unconditioned|kontrolle)"
-RELATIVE: Final = re.compile(
-    r"%|\bper ?c(ent)?|\bpct\b|pro[zc]ent|p(our|or)cent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|"
-    r"\brel(ati\w*)?\b|\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|"
-    r"\bdelta\b|\bd mep\b|[δΔ]|\bdiff|\bminus\b|mep +- |\bdb\b|\brank|[\^√]|\bresid|fitted|predict|smooth|winsor|"
-    r"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|[/÷] *mep\b|"
-    rf"([/÷]|\b(x|times|div|by|vs)\b) ?{_BASES}\b"
-)
-_RELATIVE_TITLES: Final = re.compile(
-    rf"(%|per ?cent|prozent|pour ?cent|por ?ciento) (of|vom|von|der|de|du|del|van) ?(the )?{_BASES}|\bnormali[sz]ed\b|"
-    r"\bnormiert|\bmeps? ?/"
-)
-WHOLE: Final = r"peak\W*(to|2)?\W*peak|\bp\W?(2|to|t)?\W?p\b|max\w*\W+(to\W+)?min"  # from peak to peak
-_MEASURES: Final = (
-    r"\b(bas[ei]|zero|0|onset|null)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b|\b[aá]rea\b|\baire\b|fläche|"
-    r"\bauc\b|\brms\b|integra|rectif|latenc|"
-    r"[\[(] ?(counts?|adc|adu|bits?|lsb|digits?|units?|[cm]m|kv|pu|sd|au)\b|\b[mµμu]?v([²/]| ?[*·×] ?m?s\b|m?s\b)|"
-    rf"^(?!.*({WHOLE})).*\b(trough|max|maximum|min|minimum)\b"
-)
-_FACTOR: Final = (
-    r"[×*·/÷] ?\d|(?<![a-z])x ?\d|\b\d+ ?([×*·]|x\b)|\b10 ?[\^⁺⁻⁰¹²³⁴-⁹]|(\b|\d)e ?[-+]\d|"
-    r"(?<![\w.,<>≤≥=-])(10+|0[.,]\d+) ?([mµμu]?s(ec)?|[mµμun]?v) ?([])]|$)"
-)  # such as x10 ms, 1/10 mV, 10^-1 or 0.1 ms
-_NUMBERS: Final = (
-    r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe|rank|log\d*|ln|z)\b|"
-    r"[\[(] ?([cd]s|ticks?|steps?|pts?|points?|min|hz|deg|a\.? ?u|frames?|%)\b"
-)
-_OTHERWISE: Final = (
-    ("mep", rf"\bgain\b|amplified|verstärk|{_FACTOR}", "are multiplied", "amplitudes at the electrodes"),
-    ("mep", RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
-    ("mep", _MEASURES, "are of another measure", "amplitudes from peak to peak"),
-    ("isi", _FACTOR, "are multiplied", "the intervals themselves, in ms or s"),
-    ("isi", _NUMBERS, "are numbers of something", "the intervals themselves, in ms or s"),
-)  # fmt: skip # what a column's name says of numbers that are no amplitudes or ISIs, and what is expected
 _INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
 _NUMBER: Final = re.compile(r"[-.,]*\d[\d.,]*")
 _FEW, _BELOW = 3, 50  # so many rows at most are below the trials
-_CODE, _WORDS = 4, 4  # a shorter text in rows that follow may be initials; in a longer remark bad may be of something
+_SEVERAL: Final = 12  # in a table with fewer rows most may be left out
+_CODE: Final = 4  # a shorter text in rows that follow may be initials
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
+_ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
+_BELOW_TRIALS: Final = "Delete the rows below the trials; if these are trials, number all in a column called trial."
 _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
 
-def words_of(name: str) -> str:
-    """A name in lower case, its words apart; units such as mV are one."""
-    return re.sub("mep(?!s)", " mep ", re.sub(r"(?<=[a-z]{2})(?=[A-Z])", " ", name.replace("_", " ")).casefold())
-
-
-def doubtful_words(text: str) -> list[str]:
-    """What a text has of amplitudes that are relative to others or multiplied, or of means."""
-    return [found[0] for pattern in (RELATIVE, _FACTOR, _MEANS) if (found := re.search(pattern, words_of(text)))]
-
-
-def require_of_kind(key: str, what: str, name: str, source: str) -> None:
-    """Raise if a column's name says that its numbers are something else, whatever unit is stated."""
-    for of, pattern, are, expected in _OTHERWISE:
-        if of == key and (found := re.search(pattern, words_of(name))):
-            what = f"the {what} of {source} in the column {name!r} {are}"
-            remedy = f"Name the column that holds these: --column {key}=NAME; if it is this one, correct its name."
-            raise InvalidValueError(what, got=found[0].strip(), expected=expected, remedy=remedy)
-
-
-def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source: str) -> None:
-    """Raise if rows are means of several trials: their column says so, or their SDs or numbers are beside them."""
+def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout: Layout) -> None:
+    """Raise if rows are means of several trials, or relative: their column says so, a title, or what is beside them."""
+    source = mep.of
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
-    spreads = [name for name in others if _says(name, WORDS["spreads"])]
+    spreads = [name for name in others if says_only(name, WORDS["spreads"])]
     numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in WORDS["numbers"]}
     counted_in = [name for name, texts in numbers.items() if 2 * len({*texts}) <= len(texts)
                   and all(text.isdigit() and int(text) > 1 for text in texts)]  # fmt: skip
@@ -112,17 +61,18 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
     known = WORDS["spreads"] | WORDS["sums"] | WORDS["means"]
     for name, cells in others.items():
         for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
-            if _says(odd, known) and not (
+            if says_only(odd, known) and not (
                 len(odd) < _CODE and any(one == other == odd for one, other in pairwise(cells))
             ):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
                 raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
-    heading = words_of(f"{source} {frame.attrs.get('title', '')}")
-    if (found := _RELATIVE_TITLES.search(heading)) is not None:
-        remedy = "If they are not, correct the title, or the name of the file or sheet."
-        raise mep.doubted("seems to be relative by what the title says", found[0], remedy)
-    title = _TITLES.search(heading) if once else None
-    if title or _MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
+    heading = f"{source}\n{frame.attrs.get('title', '')}"
+    if mep.name not in layout.where:
+        bare = [row for row, cells in enumerate(zip(mep.texts, isi.texts, strict=True)) if not any(cells)]
+        below = [", ".join(cell for cells in others.values() if isinstance(cell := cells[row], str)) for row in bare]
+        require_title("\n".join([heading, *below]), mep, layout.reference)
+    title = TITLES_OF_MEANS.search(words_of(heading)) if once else None
+    if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"
         what += "".join(f" beside {name!r}" for name in beside)
@@ -131,18 +81,12 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
         raise InvalidValueError(what, expected=expected, remedy=remedy)
 
 
-def _says(text: str, known: AbstractSet[str]) -> bool:
-    """True if a text, besides what stands in brackets, has words of a kind alone, such as SD (mV) or Mean (n = 8)."""
-    bare = re.sub(r"[\[(].*?[\])]|\bn ?= ?\d+", " ", words_of(text))
-    words = [word for word in re.findall(r"\w+", bare) if word not in WORDS["beside spreads"]]
-    return bool(words) and ({*words} <= known or "".join(words) in known)
-
-
 def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> None:
     """Raise if a column of which nothing is read says that a trial does not count, in its cells or by its name."""
     for column in beside:
-        key = key_of_flags(column.name)
-        texts = [*map(str.casefold, column.texts)] if key and column.name not in where else []
+        texts = [*map(str.casefold, column.texts)] if column.name not in where else []
+        key = key_of_flags(column.name) or ("exclude" if WORDS["counted"] & {*texts} else None)
+        texts = texts if key else []
         kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
         odd = [row for row, text in enumerate(texts) if text in kinds]
         are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
@@ -153,20 +97,6 @@ def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> N
         if (remark := next(filter(is_verdict, remarks), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
-
-
-def key_of_flags(name: str) -> str | None:
-    """What a column would hold whose name has a word of trials that do not count, or of those that do."""
-    words = {*re.findall(r"[^\W\d_]+", words_of(name))}
-    kinds = {"exclude": WORDS["left out"] | WORDS["flags"], "status": WORDS["counted"]}
-    return next((key for key, known in kinds.items() if words & (known | {*COLUMNS[key]})), None)
-
-
-def is_verdict(text: str) -> bool:
-    """True if a remark says that a trial does not count."""
-    said = text.casefold().partition(":")[0].strip(" !.?#*()[]")
-    words = {*(re.findall(r"\w+", said) if said.count(" ") < _WORDS else ())}
-    return said in WORDS["left out"] or (not words.isdisjoint(WORDS["left out"]) and words.isdisjoint(WORDS["no"]))
 
 
 def require_no_summaries(columns: Columns, apart: int | None) -> None:
@@ -186,8 +116,11 @@ def require_no_summaries(columns: Columns, apart: int | None) -> None:
             continue
         finer = digits[begin] > max(digits[:begin]) or np.isclose(isis[begin], np.nanmean(of_isis), rtol=1e-3)
         if below == begin or (finer and agree[0]):
-            remedy = "Delete the rows below the trials; if these are trials, number all in a column called trial."
-            raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", remedy)
+            raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
+    begins = [-1, *(n for n, count in enumerate(digits) if count == max(digits))]
+    parts = [(end, meps[begin + 1 : end]) for begin, end in pairwise(begins)]  # each below trials of its own
+    if 1 < len(begins) <= len(known) / _ROWS_A_PART and all(_is_summary(meps[n], digits[n], one) for n, one in parts):
+        raise mep.refused(known[begins[1]], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
 
 
 def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
@@ -196,14 +129,6 @@ def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
     sds = [(sd := float(np.std(group, ddof=one)), sd / len(group) ** 0.5) for group in of for one in (0, 1)]
     means = [each for group in of for each in (np.mean(group), np.median(group))]
     return number not in groups[0] and any(abs(each - number) <= slack for each in (*means, *chain(*sds)))
-
-
-def require_reference(kind: str, key: str, name: str, reference: Reference | None, source: str) -> None:
-    """Raise if the name of ISIs, or of what marks their beginning, says another event than the one that is stated."""
-    if reference is not None and (found := re.search(_ORIGINS[reference], words_of(name))):
-        remedy = f"Correct --reference, or name the {kind} of the other: --{kind} {key}=NAME."
-        what = f"the {kind} {name!r} of {source} counts from another event than is stated"
-        raise InvalidValueError(what, got=reference, expected=f"what {found[0]!r} says", remedy=remedy)
 
 
 def require_short(delivered: Delivered, layout: Layout) -> None:
@@ -305,10 +230,16 @@ def require_said(columns: Columns) -> None:
             f"Write into each row what it is; if all rows with it are TMS alone, say --alone {isi.text(unsaid[0])}."
         )
         raise condition.refused(unsaid[0], "is empty, and the ISI there is that of TMS alone", remedy)
+    flags, lost = columns[columns.flags], sum(columns.lost(row) is not None for row in columns.rows)
+    if len(columns.rows) >= _SEVERAL and 2 * lost > len(columns.rows) and flags.name not in columns.layout.where:
+        remedy = f'If yes leaves a trial out, say --column "exclude={flags.name}"; if no does, --column '
+        remedy += f'"status={flags.name}"; if it is so, --where "{flags.name}={ALL}", too.'
+        raise flags.doubted("leaves out most trials", f"{lost} of {len(columns.rows)}", remedy)
     said = [columns["status"].flag(row) for row in columns.rows if "status" in columns.of]
     if {*said} == {None, True}:
         row = columns.rows[said.index(None)]
-        raise columns["status"].refused(row, "is empty, and others say yes", "Write yes or no into each row.")
+        remedy = f'Write yes or no into each row; if empty is no, say --column "status={columns["status"].name}".'
+        raise columns["status"].refused(row, "is empty, and others say yes", remedy)
     empty = [row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None]
     empty = [row for row in empty if "mep" not in columns.of or columns["mep"].number(row) is not None]
     if empty and "asked" not in columns.of:

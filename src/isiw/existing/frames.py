@@ -16,8 +16,8 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
-from isiw.existing.doubts import doubtful_words, key_of_flags
-from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, WORDS, Layout, letters, unit_named
+from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, Layout, letters, unit_named
+from isiw.existing.names import doubtful_words, is_verdict, key_of_flags, words_of
 from isiw.existing.quantities import require_one, unit_said
 from isiw.lazy import pd, scipy
 from isiw.opening import opened
@@ -27,15 +27,18 @@ from isiw.text.sanitize import counted
 TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
 WORKBOOKS: Final = (".xlsx", ".xlsm")
 STATISTICS: Final = {".sav": "read_sav", ".zsav": "read_sav", ".por": "read_por", ".dta": "read_dta"}  # of pyreadstat
+_NOTE: Final = re.compile(rb'(?s)<comment ref="[A-Z]+(\d+)"(.*?)</comment>')
+_TEXT: Final = re.compile(r"(?s)<t(?: [^>]*)?>([^<]*)</t>")
 _LINES, _HEAD = 100, 40  # within so many lines the columns' names are sought; so many bytes show how a text is encoded
 _BLANKS: Final = r"\s+"
+_OF_TRIALS: Final = re.compile(
+    r"^(?!n\b|num|count).*(trial|sweep|frame|idx|ind(ex|ices))"
+)  # a number that may be one's own
 _COUNT: Final = "If these trials count, show them as the others; if not, mark them in a column called exclude."
 _SHOWN_OTHERWISE: Final = (
     (r'<row (?=[^>/]*hidden="(?:1|true)")[^>/]*?r="(\d+)"[^>/]*>', "hidden", _COUNT),
     (r'<c r="[A-Z]+(\d+)"[^>]*><f[^>]*(?:/>|>[^<]*</f>)(?:<v ?/>|<v></v>)?</c>', "without the result of a formula",
      "Open the workbook in Excel or LibreOffice, and save it."),
-    (rf'(?is)<comment ref="[A-Z]+(\d+)"(?:(?!</comment>).)*?<t[^>]*>\s*(?:{"|".join(WORDS["left out"])})[\s!.]*</t>',
-     "left out by a note", _COUNT),
 )  # fmt: skip # in a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do
 
 
@@ -91,10 +94,11 @@ def _texts(text: str, layout: Layout) -> pd.DataFrame:
     every = [*io.StringIO(text, newline=None)]  # no other sign ends a line, since it may stand in a cell
     lines = every[layout.skip_lines :]
     first = 0 if layout.names else _first(lines, layout)
-    title, lines = " ".join(lines[:first]), lines[first:]
+    title, lines = "".join(lines[:first]), lines[first:]
     separator = layout.separator or _separator(lines[0].lstrip("# ") if lines else "")
     if lines and lines[0].startswith("#"):
         lines = [*_first_part(lines, separator)]
+    title += "".join(line for line in lines if line.startswith("# "))
     lines = [line for line in lines if not line.startswith("# ")]
     every_row = [*_split(lines, separator)]
     table = _table([row for row in every_row if row], layout, title)
@@ -147,10 +151,10 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     names = [*layout.names] or ["" if is_missing(cell) else str(cell).strip() for cell in rows[0]]
     body = rows if layout.names else rows[1:]
     below = body[0] if body and not layout.names else ()
-    units = [unit_named(str(cell).strip().strip("[]()")) for cell in below]
+    units = [None if is_missing(cell) or not isinstance(cell, str) else _unit_below(cell) for cell in below]
     others = [str(cell) for unit, cell in zip(units, below, strict=True) if not (unit or is_missing(cell))]
     if any(units) and (not others or (sum(map(bool, units)) > 1 and not re.search(r"\d", "".join(others)))):
-        names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
+        names = [f"{name} {unit}" if unit else name for name, unit in zip(names, units, strict=False)]
         body = body[1:]
     if not body:
         raise InvalidValueError("the table has no rows", got=", ".join(names), remedy="Is the file complete?")
@@ -166,6 +170,14 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     table = pd.DataFrame([[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body], columns=names)
     table.attrs["title"] = title
     return table
+
+
+def _unit_below(cell: str) -> str | None:
+    """What a cell below a name adds to it: a unit, or words with a unit behind them, such as amplitude (mV)."""
+    if unit := unit_named(cell.strip().strip("[]()")):
+        return f"({unit})"
+    inside = re.fullmatch(r"[^\W\d]+ ?[\[(]([^][()]*)[\])]", cell.strip())
+    return cell.strip() if inside and unit_named(inside[1]) else None
 
 
 def text_of_file(path: Path) -> str:
@@ -214,7 +226,7 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         sheets[name] = rows if layout.names else rows[first:]
         heads[name] = len(cells) - len(sheets[name]) + (0 if layout.names else 1)
         above = chain.from_iterable(cells[: max(heads[name] - 1, 0)])
-        titles[name] = " ".join([name, *(cell for cell in above if isinstance(cell, str))])
+        titles[name] = "\n".join([name, *(cell for cell in above if isinstance(cell, str))])
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
     if len(with_trials) > 1:
         what = "several sheets of the workbook hold trials"
@@ -275,9 +287,16 @@ def _require_whole(book: Any, sheet: str, head: int) -> tuple[list[str], list[in
     with book[sheet]._get_source() as file:  # noqa: SLF001 - openpyxl does not read it in another way, row by row
         content = file.read()
     notes = (book._archive.read(name) for name in book._archive.namelist() if "comment" in name)  # noqa: SLF001 - the same
-    content = b"".join([content, *notes])
+    said = [
+        (row, "".join(_TEXT.findall(note.decode())).rpartition(":\n")[2])
+        for row, note in _NOTE.findall(b"".join(notes))
+    ]
+    left_out = "|".join(row.decode() for row, note in said if is_verdict(note))
     crossed, coloured = _styled(book, lambda font, _: font.strike), _styled(book, _is_coloured)
-    for pattern, are, remedy in (*_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT)):
+    noted = rf'<row [^>]*?r="({left_out})"' if left_out else "(?!)"
+    for pattern, are, remedy in (
+        *_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT), (noted, "left out by a note", _COUNT)
+    ):  # fmt: skip
         found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
         if rows := [str(row) for row in sorted(found) if row > head]:
             what = f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}"
@@ -303,7 +322,9 @@ def _is_coloured(font: Any, fill: Any) -> bool:
 
 
 def _shown_in(number_format: str) -> str:
-    """What Excel shows behind a number: the sign of per cent, or a unit."""
+    """What Excel shows behind a number: the sign of per cent, or a unit; and that it shows a part of it."""
+    if commas := re.search(r"[0#](,+)(?![0#,])", number_format):
+        return f"÷{1000 ** len(commas[1])}"
     words = [word.strip() for word in re.findall(r'"([^"]*)"', number_format)]
     return "%" if "%" in number_format else next((word for word in words if unit_named(word)), "")
 
@@ -348,10 +369,16 @@ def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
         what = "the file has no vectors that could be the columns of a table"
         remedy = "Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
         raise InvalidValueError(what, got=", ".join(arrays) or "nothing that can be read", remedy=remedy)
-    for name, vector in vectors.items():
-        if len(vector) != longest and vector.dtype.kind in "iuf" and np.any(vector > 1) and key_of_flags(name):
+    alone = {
+        name: array.ravel() for name, array in arrays.items() if array.size == 1 and _OF_TRIALS.search(words_of(name))
+    }
+    for name, vector in {**vectors, **alone}.items():
+        is_longer = np.any(vector > (name not in alone)) if vector.dtype.kind in "iuf" else False
+        if len(vector) != longest and is_longer and key_of_flags(name):
             what = f"the vector {name!r} is not as long as that of the ISIs, as if it had the numbers of some trials"
             remedy = "Save one in its place that has for each trial 1 if it does not count, and 0 if it does: exclude."
             raise InvalidValueError(what, got=vector.tolist()[:5], remedy=remedy)
     units = {name: text for name, text in texts.items() if letters(name).endswith(("unit", "units"))}
-    return pd.DataFrame({**{name: vector for name, vector in vectors.items() if len(vector) == longest}, **units})
+    table = pd.DataFrame({**{name: vector for name, vector in vectors.items() if len(vector) == longest}, **units})
+    table.attrs["title"] = "\n".join(text for name, text in texts.items() if name not in units)
+    return table

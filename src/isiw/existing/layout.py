@@ -74,7 +74,7 @@ class Layout(Checked):
         names: the columns' names, if no line of the file holds them.
         sheet: the sheet of a workbook; by default the first one.
         markers: of a recording, the name of an event by what it marks: `pulse` (of TMS), `tap`, `valve`, or `alone` (a
-            pulse without a tap).
+            pulse without a tap); `*` in it stands for anything.
         unmarked: of a recording, what pulses are that no tap comes before: TMS `alone`, or `lost`, since its marker is
             missing; asked for if others have one.
         channels: of a recording, the name of a channel by what it holds: `emg`, `acceleration`; of one in columns of

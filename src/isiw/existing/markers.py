@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from itertools import chain
 from typing import Any, Final
 
@@ -12,9 +13,10 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, says_alone
-from isiw.existing.doubts import ALL, is_verdict, kinds_at_each
-from isiw.existing.layout import MARKS, Layout, plain
-from isiw.existing.quantities import require_one
+from isiw.existing.doubts import kinds_at_each
+from isiw.existing.layout import ISI_UNITS_MS, MARKS, Layout, plain
+from isiw.existing.names import ALL, is_verdict
+from isiw.existing.quantities import isis_of, require_one
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import FloatArray
@@ -25,6 +27,8 @@ _FEW: Final = 3  # so many pulses after an event, at different times, are hardly
 EVENT: Final = "event"  # what `where` calls the events of which nothing else is read
 _NONE: Final = "no event"
 _OF_NONE: Final = re.compile("(?i)bad|sweep$|edge|.*boundary|.*new segment")  # events of no stimuli
+_ISI: Final = re.compile(r"(?i)isi[\W_]{0,2}(\d+(?:[.,]\d+)?) ?(ms|s)?(?![^\W_])")  # what a name says
+_ODD_MS: Final = 10.0  # a hammer is not so much later or earlier than usual
 _EARLY_S: Final = 20e-3  # a pulse at most so long before a tap was meant to follow it, and is TMS before the impact
 
 
@@ -95,7 +99,7 @@ def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str 
         raise InvalidValueError(f"{source} has {what} of this name", got=layout.markers[key], expected=expected)
     if len(fitting) > 1:
         what = f"events of {len(fitting)} names in {source} may mark {MARKS[key][0]}"
-        remedy = f'Say --marker "{key}={fitting[0]}", or give all that mark it one name.'
+        remedy = f'Say --marker "{key}={fitting[0]}", or one name with * for all that mark it, such as "{key}=TMS*".'
         raise InvalidValueError(what, got=", ".join(fitting), remedy=remedy)
     return fitting[0] if fitting else None
 
@@ -103,6 +107,19 @@ def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str 
 def _plain(name: str) -> str:
     """An event's name without what BrainVision puts before it and between its parts."""
     return "".join(name.rpartition("/")[2].casefold().split())
+
+
+def joined(events: pd.DataFrame, layout: Layout) -> pd.DataFrame:
+    """Events, of which those have one name that a marker such as `TMS*` says; what each was called is kept."""
+    names = events["name"].astype(str)
+    for stated in (one for one in layout.markers.values() if "*" in one and not names.eq(one).any()):
+        names = names.map(lambda name, one=stated: one if fnmatchcase(_plain(name), _plain(one)) else name)
+    return events.assign(name=names, called=events["name"])
+
+
+def _once(times_s: FloatArray) -> FloatArray:
+    """Times of a trigger, of which those found twice are one."""
+    return times_s[np.diff(times_s, prepend=-np.inf) > _TWICE_S]
 
 
 def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> list[Pulse]:
@@ -113,13 +130,12 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
         names = ", ".join(map(repr, names_of(events)))
         said = " ".join(f"--{'marker' if names else 'channel'} {one}=NAME" for one in missing)
         what = f"no event of {source} is known to mark {', nor '.join(MARKS[one][0] for one in missing)}"
-        remedy = f"Say {said}. isiw analyse FILE --look says what is in the file."
+        remedy = f"Say {said}, where NAME may end with *. isiw analyse FILE --look says what is in the file."
         raise InvalidValueError(what, got=names or "no events, so that no event was found", remedy=remedy)
     if origin_name == pulse_name:
         what = f"one event of {source} cannot mark both stimuli"
         raise InvalidValueError(what, got=pulse_name, remedy=f"Say --marker {key}=NAME.")
-    at_s, origins_s = times_of(events, pulse_name), times_of(events, origin_name)
-    origins_s = origins_s[np.diff(origins_s, prepend=-np.inf) > _TWICE_S]
+    at_s, origins_s = (_once(times_of(events, name)) for name in (pulse_name, origin_name))
     alone_s = times_of(events, None if alone_name in {pulse_name, origin_name} else alone_name)
     more_s = [at for at in alone_s.tolist() if not np.any(np.abs(at_s - at) <= _SAME_PULSE_S)]
     epochs = events[events["name"].astype(str) == "sweep"]
@@ -129,6 +145,7 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
     ]
     _require_one_each(pulses, origins_s, layout, source)
     _require_no_verdicts(events, at_s, layout, source)
+    _require_named_isis(pulses, events, layout, source)
     return _with_the_unmarked(_of_one_kind(pulses, events, key, layout, source), layout, source)
 
 
@@ -142,6 +159,33 @@ def _require_no_verdicts(events: pd.DataFrame, at_s: FloatArray, layout: Layout,
             remedy = "Mark the trial itself by an annotation whose name begins with BAD, or remove its pulse; if all "
             remedy += f'are to be analysed, say --where "{EVENT}={ALL}".'
             raise InvalidValueError(what, got=f"{name!r} at {onset_s:.3f} s", remedy=remedy)
+
+
+def _require_named_isis(pulses: Sequence[Pulse], events: pd.DataFrame, layout: Layout, source: str) -> None:
+    """Raise if names of events, such as ISI 60, say ISIs that are not those of the trials, but for a delay of all."""
+    times_s, off_ms, all_ms = events["onset"].to_numpy(), dict[str, float](), set[float]()
+    for pulse, before in zip(pulses, _before(pulses, events, layout), strict=True):
+        rows = [{str(key): cell for key, cell in row.items()}
+                for _, row in events[np.abs(times_s - pulse.at_s) < _TWICE_S].iterrows()]  # fmt: skip
+        texts = [*before, *(str(row.get("called", row["name"])) for row in rows)]
+        said_ms = {_ms_of(found): found[0].strip() for text in texts if (found := _ISI.search(text))}
+        said_ms |= {isi_ms: f"ISI {isi_ms:g}" for row in rows for isi_ms in isis_of(row)}
+        if pulse.isi_s is not None and len(said_ms) == 1:
+            ((isi_ms, text),) = said_ms.items()
+            all_ms.add(isi_ms)
+            off_ms[f"{text!r} at {pulse.at_s:.3f} s"] = 1e3 * pulse.isi_s - isi_ms
+    usual_ms = float(np.median([*off_ms.values()])) if len(off_ms) >= _FEW else 0.0
+    are_numbers = sorted(all_ms) == [*range(1, len(all_ms) + 1)]  # of conditions
+    is_asked = len(off_ms) >= _FEW and not are_numbers and EVENT not in layout.where
+    for name, ms in off_ms.items() if is_asked else ():
+        if abs(ms - usual_ms) > _ODD_MS:
+            what = f"an event of {source} names another ISI than the one between its tap and its pulse"
+            remedy = f'Correct the events; if their names are wrong, say --where "{EVENT}={ALL}".'
+            raise InvalidValueError(what, got=name, expected=f"{ms - usual_ms:+.0f} ms", remedy=remedy)
+
+
+def _ms_of(found: re.Match[str]) -> float:
+    return float(found[1].replace(",", ".")) * ISI_UNITS_MS[(found[2] or "ms").casefold()]
 
 
 def _before(pulses: Sequence[Pulse], events: pd.DataFrame, layout: Layout) -> list[dict[str, float]]:

@@ -10,13 +10,18 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing import doubts
-from isiw.existing.cells import Column, required_unit, says_alone, with_decimals, without_unit_in_cells
+from isiw.existing.cells import Column, is_missing, required_unit, says_alone, with_decimals, without_unit_in_cells
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, WORDS, Layout, letters, plain, unit_named
+from isiw.existing.names import ALL, RELATIVE, require_of_kind, require_order, require_reference, words_of
 from isiw.findings import Kind
 from isiw.lazy import pd
 
 _ASKED: Final = frozenset({"isi", "mep", "status", "exclude"})  # of which there may be two, that say different things
 _MANY: Final = 5000  # so many trials has no person
+_OF_MEPS: Final = (
+    "Correct it: 0 is no MEP, or one below the detection limit, and an empty cell a lost trial; or name another "
+    "column: --column mep=NAME."
+)
 _OF_ISIS: Final = "Correct it; if it is TMS alone, say --alone with it; or name another column: --column isi=NAME."
 
 
@@ -60,6 +65,18 @@ class Columns:
         """True if a row is marked as excluded, by yes or by a word such as bad."""
         return bool(self["exclude"].flag(row, "left out", "counted"))
 
+    @property
+    def units_by(self) -> tuple[str, str]:
+        """The names of the columns of ISIs and amplitudes, as far as they say a unit."""
+        known = (("isi", ISI_UNITS_MS), ("mep", EMG_UNITS))
+        isi, mep = (self[key].name if unit_said(self[key].name, units) else "" for key, units in known)
+        return isi, mep
+
+    @property
+    def flags(self) -> str:
+        """The key of the column by which rows are lost."""
+        return "status" if "status" in self.of else "exclude"
+
     def lost(self, row: int) -> Kind | None:
         """Why a row is marked as lost; None if it is not."""
         bad = self.excluded(row) and "status" not in self.of
@@ -79,20 +96,28 @@ class Columns:
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
                 of_units |= units.keys()
         columns, stated = _scaled(columns, layout)
-        columns["isi"] = replace(columns["isi"], remedy=_OF_ISIS)
+        columns |= _with_taps_alone(replace(columns["isi"], remedy=_OF_ISIS), columns.get("tap_alone"))
         for key in [key for key in columns if key not in layout.columns and _is_another(key, columns)]:
             held[key] = None
             del columns[key]
         if "subject" in columns:
             columns["subject"] = replace(columns["subject"], of_codes=True)
+        if "status" in layout.columns and {*map(columns["status"].flag, range(len(frame)))} == {None, True}:
+            cells = ["no" if is_missing(cell) else cell for cell in columns["status"].cells]
+            columns["status"] = replace(columns["status"], cells=cells)
         if "mep" in columns:
-            doubts.require_single_trials(columns["mep"], columns["isi"], frame, source)
+            columns["mep"] = replace(columns["mep"], remedy=_OF_MEPS)
+            doubts.require_single_trials(columns["mep"], columns["isi"], frame, layout)
         used = {*held.values(), *of_units}
-        beside = {name: Column(name, frame.iloc[:, place].tolist(), of=source)
-                  for place, name in enumerate(names) if name not in used and name.strip()}  # fmt: skip
+        cells_of = {name if name.strip() else f"column {place + 1}": frame.iloc[:, place].tolist()
+                    for place, name in enumerate(names) if name not in used}  # fmt: skip
+        beside = {name: Column(name, cells, of=source) for name, cells in cells_of.items()
+                  if name in names or not all(map(is_missing, cells))}  # fmt: skip
         doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})],
                                    layout.where)  # fmt: skip
-        doubts.require_reference("column", "isi", columns["isi"].name, layout.reference, source)
+        require_reference("column", "isi", columns["isi"].name, layout.reference, source)
+        if columns["isi"].name not in layout.where:
+            require_order(columns["isi"])
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = WORDS["alone"] | WORDS["tap alone"]
             of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
@@ -113,6 +138,17 @@ def _require_held(missing: Sequence[str], frame: pd.DataFrame, source: str) -> N
         raise InvalidValueError(what, got=got, remedy=remedy)
 
 
+def _with_taps_alone(isi: Column, flags: Column | None) -> dict[str, Column]:
+    """The ISIs, and which rows are a tap alone, if the cells of ISIs say so of some."""
+    taps = [isinstance(cell, str) and plain(cell) in WORDS["tap alone"] for cell in isi.cells]
+    if not any(taps):
+        return {"isi": isi}
+    said = flags or replace(isi, cells=[None] * len(taps))
+    cells = [None if tap else cell for tap, cell in zip(taps, isi.cells, strict=True)]
+    others = [1 if tap else cell for tap, cell in zip(taps, said.cells, strict=True)]
+    return {"isi": replace(isi, cells=cells), "tap_alone": replace(said, cells=others)}
+
+
 def _is_another(key: str, columns: Mapping[str, Column]) -> bool:
     """True if a column is of no use as what its name says: an id of each row, reasons of nothing, or amplitudes."""
     texts = columns[key].texts if key in {"subject", "tms_alone", "order"} else []
@@ -130,10 +166,10 @@ def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:
     for name, wanted in layout.where.items():
         require_one("column", source, name, every)
         texts = every[name].texts
-        if wanted not in {doubts.ALL, *texts}:
+        if wanted not in {ALL, *texts}:
             what = f"no row of {source} has this in its column {name!r}"
             raise InvalidValueError(what, got=wanted, expected=f"one of {', '.join([*dict.fromkeys(texts)][:9])}")
-        kept = [row for row in kept if wanted in {doubts.ALL, texts[row]}]
+        kept = [row for row in kept if wanted in {ALL, texts[row]}]
     return kept
 
 
@@ -148,7 +184,7 @@ def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Co
                               ("background", EMG_UNITS, "uV")):  # fmt: skip
         if key in scaled:
             if known is ISI_UNITS_MS:
-                doubts.require_of_kind("isi", "ISIs", scaled[key].name, scaled[key].of)
+                require_of_kind("isi", "ISIs", scaled[key].name, scaled[key].of)
             factors[key] = known[unit_said(scaled[key].name, known) or usual] * (1e3 if known is EMG_UNITS else 1.0)
     scaled |= {key: replace(scaled[key], factor=factor) for key, factor in factors.items() if key in scaled}
     return scaled, (isi_unit, mep_unit)
@@ -175,7 +211,7 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
             for name in names if name not in layout.columns.values()]  # fmt: skip
     found = [(known, name) for known in COLUMNS[key] for name, plain_name in free if plain_name == known]
     if key == "mep":  # one in per cent may stand beside it
-        found = [one for one in found if not re.search(doubts.RELATIVE, doubts.words_of(one[1]))] or found
+        found = [one for one in found if not re.search(RELATIVE, words_of(one[1]))] or found
     first = found[0][0] if found else ""
     several = [name for known, name in found
                if known == first or (key in _ASKED and len({known, first} & WORDS["vague"]) != 1)]  # fmt: skip
@@ -210,6 +246,12 @@ def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
     return found
 
 
+def unit_of(name: str, frame: pd.DataFrame) -> str:
+    """The unit of a channel by its name and by what a column beside it says; empty if none does."""
+    said = "".join([name, *(f" ({unit})" for unit in units_beside("emg", name, frame).values())])
+    return unit_said(said, EMG_UNITS) or ""
+
+
 def _units_above(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
     """The unit that the title says of ISIs or amplitudes, such as "times in s", if a column's name says none."""
     known = {"isi": {**ISI_UNITS_MS, "samples": 1.0}, "mep": EMG_UNITS}.get(key, {})
@@ -231,14 +273,14 @@ def unit_said(name: str, known: Mapping[str, float]) -> str | None:
 
 def _required_unit(key: str, what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
     """The column's unit, as it is stated or as its name says, which must not say that it is something else."""
-    doubts.require_of_kind(key, what, column.name, column.of)
+    require_of_kind(key, what, column.name, column.of)
     if (other := unit_said(column.name, dict.fromkeys({*UNIT_WORDS.values()} - known.keys(), 1.0))) is not None:
         remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."
         raise column.doubted(f"says a unit of no {what}", other, remedy)
     some = ", ".join(filter(None, column.texts[:5])) or None
     said, stated = unit_said(column.name, known), layout.unit_of(known)
     if said and stated and known[said] != known[stated] and column.name not in layout.where:
-        remedy = f'Leave out the wrong one of them; if it is the name, say --where "{column.name}={doubts.ALL}", too.'
+        remedy = f'Leave out the wrong one of them; if it is the name, say --where "{column.name}={ALL}", too.'
         raise column.doubted("says another unit than the one that is stated", stated, remedy, said)
     what = f"the {what} of {column.of} in the column {column.name!r}"
     return required_unit(layout, known, said, what, some)

@@ -23,6 +23,7 @@ from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import CHANNELS, EMG_UNITS, Layout
 from isiw.existing.limits import ReadingLimits, require_file, require_most, require_table
 from isiw.existing.markers import EVENT
+from isiw.existing.names import ALL
 from isiw.existing.quantities import Columns
 from isiw.files import is_mcap
 from isiw.findings import INTENSITY_PCT, Kind
@@ -218,6 +219,7 @@ def _person(columns: Columns, reference: Reference, subject: str) -> Delivered:
         subject=subject,
         source=columns["isi"].of,
         units=columns.units,
+        units_by=columns.units_by,
         unused=tuple(columns.beside),
         blocks={n: block for n, (before, block) in enumerate(pairwise(blocks), 1) if block != before},
         visit=Visit(intensity_pct_rmt=paired_pct_rmt),
@@ -231,6 +233,9 @@ def _trial(columns: Columns, row: int, number: int, space: DesignSpace, signals:
     mep_mv, lost = columns["mep"].number(row), columns.lost(row)
     if mep_mv is not None and not 0 <= mep_mv <= MOST_MEP_MV:
         remedy = "It must be from peak to peak, in the unit that is stated; is --unit right?"
+        if by := columns.units_by[1]:
+            remedy = "It must be from peak to peak. If its name has the wrong unit, say the right one by --unit, and "
+            remedy += f'--where "{by}={ALL}".'
         raise columns.of["mep"].refused(row, "is no amplitude", remedy)
     facts: dict[str, Any] = {
         "commanded_isi_ms": asked_ms,
@@ -263,7 +268,7 @@ def _with_intensities(trials: Sequence[Trial], columns: Columns) -> tuple[list[T
             paired[pct_rmt] = columns["intensity"].text(row)
     if len(texts := [text for text in paired.values() if text]) > 1 and name not in columns.layout.where:
         what, got = f"the pairs of {columns['isi'].of} have several intensities", ", ".join(texts)
-        remedy = f'Say --where "{name}={texts[0]}" for one of them, or --where "{name}={doubts.ALL}" '
+        remedy = f'Say --where "{name}={texts[0]}" for one of them, or --where "{name}={ALL}" '
         raise InvalidValueError(what, got=f"{got} % RMT", remedy=f"{remedy}if all are to be analysed together.")
     usual = next(iter(paired)) if len(paired) == 1 else None
     for trial, pct_rmt in zip(trials, stated, strict=True):

@@ -15,12 +15,13 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing, required_unit
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubtful_numbers import require_plain_isis
-from isiw.existing.doubts import ALL, is_rectified, require_reference, require_said, words_of
+from isiw.existing.doubts import is_rectified, require_said
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
-from isiw.existing.layout import EMG_UNITS, MARKERS, Layout, unit_named
-from isiw.existing.markers import Pulse, marked, names_of, note_of_others, pulses_of
+from isiw.existing.layout import EMG_UNITS, MARKERS, WORDS, Layout, unit_named
+from isiw.existing.markers import Pulse, joined, marked, names_of, note_of_others, pulses_of
+from isiw.existing.names import ALL, not_as_recorded, require_reference
 from isiw.existing.quantities import Columns, isis_of, require_one, unit_said
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -33,12 +34,10 @@ from isiw.trials import Status, Stimulus, Trial
 from isiw.types import FloatArray
 
 _BEFORE_S, _AFTER_S = 0.15, 0.1  # of a continuous recording, before the longest ISI and after the pulse
-_OTHERWISE: Final = re.compile(
-    r"\bgain\b|amplified|verstärk|[x×*] ?10|\b1/10|10 ?[\^⁺⁻⁰¹²³⁴-⁹]|(\b10+|0[.,]\d+) ?[mµμun]?v\b|\brms\b|integra|"
-    r"rectif|gleichger|envelope|\b(means?|averaged?|averages?|avg|gemittelt|mittelwerte?|moyennes?)\b"
-)  # what a channel's name says that is not the EMG as it was recorded
 _APART_MS: Final = 2.0  # an ISI in a table that differs by more from that of the events is another one
 _SLOW_HZ: Final = 1000.0  # a trigger with fewer samples a second is said
+_LATEST_MS, _SPREAD_MS = 60.0, 5.0  # a response is not later; ISIs that are nearer to each other tell nothing
+_SLOPE, _FITS = 0.2, 0.9  # so near to 1 is the slope of responses by ISIs if they follow the tap
 _CLEAR, _EDGE, _FEW = 25.0, 0.4, 3  # an MEP so many times the EMG at rest is cut off if it has so much at an edge
 _IF_NONE_COUNTS: Final = (
     "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest without mains "
@@ -103,6 +102,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         source=source,
         signals=limits,
         units=("ms", unit),
+        units_by=("", signals["emg"].name if signals["emg"].unit and not contents.unit_is_usual else ""),
         sweeps=sweeps,
         unused=unused,
         notes=(*contents.notes, *is_rectified(emg)),
@@ -121,6 +121,7 @@ def _require_within(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, s
             edges = zip((first_ms, last_ms, None), (*(within[[0, -1]] > _EDGE * within.max()), True), strict=True)
             responses_ms.append(next(at_ms for at_ms, is_large in edges if is_large))
         usual |= shown.stands_out
+    _require_at_pulse(seen, limits, source)
     odd_ms = [at_ms for at_ms in responses_ms if at_ms is not None]
     if len(seen) > _FEW and (not usual or (2 * len(odd_ms) > len(responses_ms) and 4 * len(odd_ms) > len(seen))):
         what = f"most responses in {source} are not within {first_ms:g}–{last_ms:g} ms after the pulse, where MEPs are "
@@ -128,6 +129,23 @@ def _require_within(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, s
         remedy = "Does its marker, or time 0, come at the pulse? If so, write the muscle's "
         remedy += "mep_window_ms = [FIRST, LAST] into a layout."
         raise InvalidValueError(f"{what}measured", got=got, remedy=remedy)
+
+
+def _require_at_pulse(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, source: str) -> None:
+    """Raise if responses come later by as much as their ISIs are longer, as they do after the tap."""
+    isis_ms, peaks_ms = list[float](), list[float]()
+    for sweep, trial in seen:
+        emg, since_ms = sweep.channels["emg"], _since_pulse_ms(sweep)
+        within = np.where((since_ms >= limits.mep_window_ms[0]) & (since_ms <= _LATEST_MS), np.abs(emg.values), 0.0)
+        if trial.isi_ms is not None:
+            isis_ms.append(trial.isi_ms)
+            peaks_ms.append(float(since_ms[np.argmax(within >= within.max() / 2)]))
+    if len(isis_ms) > _FEW and np.ptp(isis_ms) > _SPREAD_MS and np.ptp(peaks_ms) > 0:
+        slope, fits = np.polyfit(isis_ms, peaks_ms, 1)[0], np.corrcoef(isis_ms, peaks_ms)[0, 1]
+        if abs(slope - 1) < _SLOPE and fits > _FITS:
+            what = f"the responses in {source} come later by as much as their ISIs are longer"
+            remedy = "Is time 0, or the marker of the pulse, that of the tap? Cut the sweeps about the pulse."
+            raise InvalidValueError(what, got=f"{slope:.2f} ms a ms", expected="about 0", remedy=remedy)
 
 
 def _since_pulse_ms(sweep: Sweep) -> FloatArray:
@@ -143,11 +161,12 @@ def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[st
     key = origin_key(layout)
     for kind, names in (("marker", layout.markers), ("channel", layout.channels)):
         require_reference(kind, key, names.get(key, ""), layout.reference, contents.source)
-    odd = _OTHERWISE.search(words_of(tracks["emg"].name))
-    if odd is not None and tracks["emg"].name not in layout.where:
+    said = [*map(not_as_recorded, (tracks["emg"].name, tracks["emg"].said)), "bad" if tracks["emg"].bad else None]
+    odd = next(filter(None, said), None)
+    if odd and tracks["emg"].name not in layout.where:
         what = f"the channel {tracks['emg'].name!r} of {contents.source} is not EMG as it was recorded"
         remedy = f'Say --channel emg=NAME of another; if it is, say --where "{tracks["emg"].name}={ALL}".'
-        raise InvalidValueError(what, got=odd[0], remedy=remedy)
+        raise InvalidValueError(what, got=odd, remedy=remedy)
     if layout.rate_hz is not None:
         require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
     notes = contents.notes
@@ -155,6 +174,7 @@ def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[st
         notes = (*notes, f"{slow.name!r} has a sample each {1e3 / slow.rate_hz:g} ms: ISIs are not known better.")
     triggers = events_of((key, at_s, 0.0) for key in MARKERS if key in tracks for at_s in tracks[key].onsets_s())
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
+    events = joined(events, layout)
     emg = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
     unit, noted = _unit_of(emg, contents, layout)
     return (
@@ -168,7 +188,13 @@ def _unit_of(emg: Track, contents: Contents, layout: Layout) -> tuple[str, tuple
     """The unit of the EMG, and a note if the file says another one."""
     what, known = f"the channel {emg.name!r} of {contents.source}", unit_named(emg.unit)
     unit = required_unit(layout, EMG_UNITS, known, what, emg.unit or None)
-    if known == unit or (known is None and not re.search(r"\d", emg.unit)):
+    named = {unit_named(word) for word in re.split(r"[\s,]+", emg.unit)} & EMG_UNITS.keys()  # such as in two places
+    if (
+        known == unit
+        or is_missing(emg.unit)
+        or (len(named) > 1 and known is None)
+        or emg.unit.strip().casefold() in WORDS["unknown"]
+    ):
         return unit, ()
     if not contents.unit_is_usual and emg.name not in layout.where:
         what += " says another unit than the one that is stated"

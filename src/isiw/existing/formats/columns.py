@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Final, Literal
@@ -14,8 +15,8 @@ from isiw.errors import InvalidValueError
 from isiw.existing import frames
 from isiw.existing.cells import Column, is_missing, with_decimals
 from isiw.existing.formats.contents import Contents, Track, events_of, parted, timed
-from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, Layout, unit_named
-from isiw.existing.quantities import require_one, unit_said
+from isiw.existing.layout import ISI_UNITS_MS, MARKERS, Layout, unit_named
+from isiw.existing.quantities import require_one, unit_of, unit_said
 from isiw.lazy import pd
 from isiw.types import FloatArray
 
@@ -52,10 +53,16 @@ def read(path: Path, layout: Layout) -> Contents:
             texts = [(str(text).lstrip("#* "), at, 0.0) for at, text in enumerate(frame[name]) if not is_missing(text)]
         else:
             values, kind = _numbers(frame, name, layout, source), "stim" if key in MARKERS else ""
-            tracks.append(Track.of_values(name, rate_hz, stretches, values, unit_said(name, EMG_UNITS) or "", kind))
+            track = Track.of_values(name, rate_hz, stretches, values, unit_of(name, frame), kind)
+            tracks.append(replace(track, said=of_emg(head) if key == "emg" else ""))
     rows = timed(texts, stretches, rate_hz)
     rows += [("sweep", one.start_s, one.samples / rate_hz) for one in stretches if len(blocks) > 1]
     return Contents(source, tuple(tracks), events_of(rows))
+
+
+def of_emg(text: str) -> str:
+    """The lines of a text that are of EMG."""
+    return "\n".join(line for line in text.splitlines() if re.search(r"(?i)\bemg\b", line))
 
 
 def required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.layout import unit_named
+from isiw.existing.layout import COLUMNS, WORDS, letters, unit_named
 from isiw.lazy import pd
 from isiw.types import FloatArray, IntArray
 
@@ -23,7 +23,9 @@ _ROWS: Final = 2**20  # of a file beside a recording; without a number pandas op
 _SAME: Final = 1.5  # so many samples apart a code and an event of one name are one event
 _GAP_S: Final = 2.5e-3  # samples that are later than expected by so much, for good, come after a gap; others jitter
 _AROUND_S: Final = 1.0
+_LASTS_S: Final = 1e-3  # what is beside an event that does not count lasts so long at least
 _SHORT, _LEVEL = 2, 0.7  # a level that lasts longer [samples] is so near to the highest or lowest one of a trigger
+_BETWEEN, _SLOW_S = 0.6, 1e-3  # an edge of a trigger is not longer so near to the middle of its levels
 _ENOUGH_S: Final = 10.0  # a stretch that is longer says at which rate its samples were really taken
 _SCATTER_S: Final = 2e-3  # times that scatter more are said
 
@@ -122,6 +124,8 @@ class Track:
     read: Callable[[int, int], FloatArray]  # its numbers from one sample to before another, scaled as the file says
     unit: str = ""  # of these numbers, as the file writes it; empty if it says none
     kind: str = ""  # such as emg or stim, where the file says so
+    said: str = ""  # what else it says, such as of filters
+    bad: bool = False  # whether it says that the channel is bad
 
     @classmethod
     def of_values(
@@ -164,17 +168,21 @@ class Track:
         """When a trigger leaves the level at which it mostly is [s]; raise if it is as long at the other one."""
         ends = [(values.min(), values.max()) for _, values, _ in self.pieces()]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2 if ends else 0.0
-        rises, falls, high, tops = list[float](), list[float](), 0, list[float]()
+        rises, falls, high, between, tops = list[float](), list[float](), 0, 0, list[float]()
+        near = _BETWEEN * (max(most for _, most in ends) - middle) if ends else 0.0
         for at_s, values, before in self.pieces():
             above = values > middle
             high += int(above.sum())
+            between += int((np.abs(values - middle) < near).sum())
             turns = np.diff(above.astype(np.int8), prepend=np.int8(before > middle))
             rises += (at_s + np.flatnonzero(turns > 0) / self.rate_hz).tolist()
             falls += (at_s + np.flatnonzero(turns < 0) / self.rate_hz).tolist()
             if (edges := np.flatnonzero(turns)).size:
                 lasts = np.diff([*edges, len(values)])
                 tops += np.maximum.reduceat(np.abs(values - middle), edges)[lasts > _SHORT].tolist()
-        if tops and np.quantile(tops, 0.25) < _LEVEL * (max(high for _, high in ends) - middle):
+        slow_s = between / self.rate_hz / max(len(rises) + len(falls), 1)
+        is_wave = tops and np.quantile(tops, 0.25) < _LEVEL * (max(most for _, most in ends) - middle)
+        if is_wave or slow_s > max(_SLOW_S, _SHORT / self.rate_hz):
             what = f"the trigger {self.name!r} has more than two levels, as a wave of force or acceleration has"
             remedy = "Export events in its place that say when it begins, or a trigger of two levels."
             raise InvalidValueError(what, remedy=remedy)
@@ -244,7 +252,9 @@ class Contents:
         """The same with the events and the units of channels that BIDS has in files beside a recording."""
         channels, events = (_beside(path, what) for what in ("channels", "events"))
         units = dict(zip(map(str, channels.get("name", ())), channels.get("units", ()), strict=False))
-        tracks = tuple(one.with_unit(units.get(one.name)) for one in self.tracks)
+        states = dict(zip(map(str, channels.get("name", ())), channels.get("status", ()), strict=False))
+        tracks = tuple(replace(one.with_unit(units.get(one.name)), bad=one.bad or states.get(one.name) == "bad")
+                       for one in self.tracks)  # fmt: skip
         if not len(events):
             return replace(self, tracks=tracks)
         off = (events["onset"] * tracks[0].rate_hz - events.get("sample", np.nan)).abs().median() if tracks else 0.0
@@ -254,7 +264,22 @@ class Contents:
             raise InvalidValueError(what, got=f"{off:.0f} samples apart", expected=expected, remedy=remedy)
         named = [events[one] for one in ("trial_type", "value") if one in events and events[one].notna().any()]
         names = [text_of(each) for each in named[0]] if named else ""
-        return replace(self, tracks=tracks, events=events.assign(name=names))
+        return replace(self, tracks=tracks, events=with_bad(events.assign(name=names), "sweep"))
+
+
+def with_bad(events: pd.DataFrame, *but: str) -> pd.DataFrame:
+    """Events, and one that begins with BAD beside each that a column says not to count, but for some by their names."""
+    rows, bad = events[~events["name"].isin(but)], set[Any]()
+    for name in map(str, events.columns):
+        key = next((key for key in ("exclude", "status") if letters(name) in COLUMNS[key]), None)
+        is_verdict = key is not None or not WORDS["counted"].isdisjoint(rows[name].astype(str).str.casefold())
+        kinds = WORDS["left out"] | WORDS["yes" if key == "exclude" else "no"] if key else WORDS["left out"]
+        if not is_verdict:
+            continue
+        bad |= {row for row, cell in rows[name].items() if str(cell).casefold() in kinds}
+    held = [events.loc[row] for row in sorted(bad)]
+    added = [(f"BAD {one['name']}", one["onset"], max(one["duration"], _LASTS_S)) for one in held]
+    return pd.concat([events, events_of(added)], ignore_index=True) if added else events
 
 
 def _beside(path: Path, what: str) -> pd.DataFrame:

@@ -69,7 +69,8 @@ def read(path: Path, _layout: Layout) -> Contents:
         if signal not in noted and (count := header.counts[signal]):
             kind = "stim" if header.is_status(signal) else "emg" if label.casefold().startswith("emg") else ""
             stretches, part = tuple(_stretches(starts, header.record_s, count)), partial(header.samples, signal)
-            tracks.append(Track(label, count / header.record_s, stretches, part, header.fields["unit"][signal], kind))
+            unit, said = header.fields["unit"][signal], header.fields["filter"][signal]
+            tracks.append(Track(label, count / header.record_s, stretches, part, unit, kind, said))
     events = [event for each in lists for row in each for event in row if event[0]]
     return Contents(path.name, tuple(tracks), with_codes(events, tracks)).with_bids(path)
 

@@ -44,9 +44,18 @@ def read(path: Path, layout: Layout) -> Contents:
         kind = place["type"].casefold() if isinstance(place.get("type"), str) else ""
         part = partial(_beside, path, data, count, n) if whole is None else partial(part_of, whole[n])
         tracks.append(Track(str(place.get("labels") or f"channel {n + 1}"), rate_hz, stretches, part, "uV", kind))
-    events = events_of(timed((one for one in noted if one[0] != "boundary"), stretches, rate_hz))
+    bad = [("BAD epoch", n * samples, samples / rate_hz) for n in _rejected(eeg.get("reject"), trials)]
+    events = events_of(timed((one for one in (*noted, *bad) if one[0] != "boundary"), stretches, rate_hz))
     notes = () if layout.unit_of(EMG_UNITS) else (_ASSUMED,)
     return Contents(path.name, tuple(tracks), events, unit_is_usual=True, notes=notes).with_bids(path)
+
+
+def _rejected(reject: Any, trials: int) -> list[int]:
+    """The epochs that EEGLAB has marked, and not removed yet."""
+    fields = reject.items() if isinstance(reject, Mapping) else ()
+    marks = [np.ravel(value) for key, value in fields if str(key).startswith("rej") and np.size(value) == trials > 1]
+    marked = [np.flatnonzero(np.nan_to_num(mark)) for mark in marks if mark.dtype.kind in "biuf"]
+    return sorted({n for each in marked for n in each.tolist()})
 
 
 def _beside(path: Path, name: str, count: int, channel: int, first: int, last: int) -> FloatArray:

@@ -87,5 +87,6 @@ def _tracks(held: Any, stretches: tuple[Stretch, ...], part: Callable[[int, int,
         said = units.get(name, "V")
         usual = "" if kind == "misc" and said not in {"V", "n/a", ""} else kind
         read, unit = partial(part, index), "" if said == "n/a" else said
-        track = Track(str(name), float(held.info["sfreq"]), stretches, read, unit, usual)
+        is_bad = name in held.info["bads"]
+        track = Track(str(name), float(held.info["sfreq"]), stretches, read, unit, usual, bad=is_bad)
         yield track.scaled(1.0 / _SCALES_V.get(said, 1.0))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from isiw.existing.formats.contents import Contents, Stretch, Track, clocked, events_of, text_of
+from isiw.existing.formats.contents import Contents, Stretch, Track, clocked, events_of, text_of, with_bad
 from isiw.existing.layout import Layout
 from isiw.lazy import pd
 from isiw.text.named_code import library
@@ -27,8 +27,9 @@ def read(path: Path, _layout: Layout) -> Contents:
             texts, times_s = one.data[:], one.timestamps[:]
             events.append(events_of((text_of(text), float(at), 0.0) for text, at in zip(texts, times_s, strict=True)))
         elif isinstance(one, pynwb.epoch.TimeIntervals):
-            tables.append(one.to_dataframe())
-            events.append(_events(tables[-1], "start_time", "sweep"))
+            table, is_bad = one.to_dataframe(), one.name == "invalid_times"
+            tables += [] if is_bad else [table]
+            events.append(with_bad(_events(table, "start_time", "BAD invalid times" if is_bad else "sweep")))
         elif isinstance(one, pynwb.core.DynamicTable) and "timestamp" in one.colnames:
             events.append(_events(one.to_dataframe(), "timestamp", str(one.name)))
         elif isinstance(one, pynwb.TimeSeries) and getattr(one.data, "ndim", np.ndim(one.data)) in {1, 2}:

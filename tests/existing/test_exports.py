@@ -1,0 +1,206 @@
+"""What exports of labs' programs say in names, titles, remarks and cells: it is read, or asked about in a sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import openpyxl
+import pandas as pd
+import pytest
+import scipy.io
+
+from existing.test_doubtful_numbers import ALONE, ISIS, MEPS, STATED, few, table
+from existing.test_tables import IMPACT, trials_of
+from isiw.errors import IsiwError
+from isiw.existing.layout import Layout
+from isiw.existing.reading import read_people
+
+EMPTY_IS_ALONE = Layout("impact", alone="")
+KEPT = few(bad=False, good=True)
+WAY_OUT = r'--where "MEP \(mV\)=\*"'
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["nMEP", "MEP_n", "MEP/TS", "MEP (re TS)", "MEP (x test)", "cond/test", "MEP (times TS)", "MEPcond_MEPtest",
+     "MEP index", "MEP_detrended", "adjusted MEP", "standardised MEP", "MEP centered", "iEMG (mV)", "Rect. EMG (mV)",
+     "ARV (mV)", "MEP power (mV)", "MEP counts"],
+)  # fmt: skip
+def test_other_measures_and_what_is_relative_are_known_by_more_names(name: str) -> None:
+    with pytest.raises(IsiwError, match=r"are (relative to others|of another measure)"):
+        read_people(table(mep=name), STATED.saying(columns={"mep": name}))
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("MEPs expressed as % Mmax", "to be relative"),
+        ("Amplitudes relative to TMS alone", "to be relative"),
+        ("z-scored MEPs", "to be relative"),
+        ("log-transformed MEP amplitudes", "to be relative"),
+        ("All MEPs divided by their mean in TS", "to be relative"),
+        ("Amplitude: conditioned / test", "to be relative"),
+        ("amplitudes averaged over 4 pulses", "to be means of several trials"),
+        ("omit #4 #9", "which trials do not count"),
+        ("Amplituden bezogen auf TMS allein", "to be relative"),
+        ("MEP amplitudes (x10)", "to be multiplied"),
+        ("MEP in 10 µV", "to be multiplied"),
+        ("rectified MEP areas", "to be of another measure"),
+        ("Baseline-to-peak amplitudes", "to be of another measure"),
+        ("averages of 3 sweeps each", "to be means of several trials"),
+        ("ISIs are counted from the solenoid trigger", "counts ISIs from another event"),
+        ("excluded trials: 4, 17", "which trials do not count"),
+        ("artefacts in trials 3 and 8", "which trials do not count"),
+        ("Ausgeschlossen: Nr. 7 und 12", "which trials do not count"),
+    ],
+)
+def test_a_line_above_or_below_the_trials_says_what_they_are(line: str, says: str, tmp_path: Path) -> None:
+    rows, path = table().to_csv(index_label="trial", sep=";"), tmp_path / "P01.csv"
+    for text in (f"{line}\n{rows}", f"{rows}\n{line}\n", f"# {line}\n{rows}"):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(IsiwError, match=rf"{says}.*{WAY_OUT}"):
+            read_people(path, EMPTY_IS_ALONE)
+        assert len(trials_of(read_people(path, EMPTY_IS_ALONE.saying(where={"MEP (mV)": "*"})))) == 48
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["TMS at 120 % of rMT; ISI 10-190 ms, 4 trials of each, ITI 5 s x 50", "valve-driven tapper, ISIs from impact",
+     "Experiment 3 (bad weather)", "Mean RMT 45 %", "p2p amplitudes, no trials excluded", "each ISI repeated 4 times",
+     "Artefact rejection 100 µV; excluded: 3 trials", "Filter 20-2000 Hz, gain 1000, amplitudes at the electrodes",
+     "MEPs at delays relative to the impact", "Afferent inhibition and MEP amplitudes, day 2"],
+)  # fmt: skip
+def test_other_lines_are_not_asked_about(line: str, tmp_path: Path) -> None:
+    (tmp_path / "P01.csv").write_text(f"{line}\n{table().to_csv(index=False, sep=';')}", encoding="utf-8")
+    assert len(trials_of(read_people(tmp_path / "P01.csv", EMPTY_IS_ALONE))) == 48
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("Delay from trigger (ms)", "counts from a trigger"), ("trigger-TMS delay (ms)", "counts from a trigger"),
+     ("ISI (TMS to tap) (ms)", "the pulse came before the tap"), ("tap after TMS (ms)", "the pulse came before")],
+)  # fmt: skip
+def test_isis_of_a_trigger_or_up_to_the_tap_are_asked_about(name: str, says: str) -> None:
+    layout = STATED.saying(columns={"isi": name})
+    with pytest.raises(IsiwError, match=says):
+        read_people(table(isi=name), layout)
+    assert len(trials_of(read_people(table(isi=name), layout.saying(where={name: "*"})))) == 48
+    for usual in ("tap-TMS interval (ms)", "TMS after tap (ms)", "CS-TS (ms)"):
+        assert len(trials_of(read_people(table(isi=usual), STATED.saying(columns={"isi": usual})))) == 48
+
+
+@pytest.mark.parametrize(
+    "remark",
+    ["repeat", "repeated", "delete", "skip", "ignore", "omitted", "wiederholt", "nicht auswertbar", "EMG not relaxed",
+     "coil slipped, do not use", "eliminare", "not valid", "no good", "excl.", "stimulator error", "coil off"],
+)  # fmt: skip
+def test_more_remarks_leave_a_trial_out(remark: str) -> None:
+    with pytest.raises(IsiwError, match=r"row 5 of the column 'note' .* says that the trial does not count"):
+        read_people(table(note=few(remark, "")), EMPTY_IS_ALONE)
+    for usual in ("not repeated", "not bad", "no artefact", "ok, no artefact"):
+        assert len(trials_of(read_people(table(note=few(usual, "")), EMPTY_IS_ALONE))) == 48
+
+
+@pytest.mark.parametrize(
+    ("name", "bad", "good", "key"),
+    [("QC", "fail", "pass", "exclude"), ("check", "NOK", "OK", "exclude"), ("quality", "poor", "good", "exclude"),
+     ("blink", "*", "", "exclude"), ("Auswahl", "", "x", "status"), ("valid (0 = ok)", 1, 0, "exclude"),
+     ("artifact (1 = clean)", 0, 1, "status")],
+)  # fmt: skip
+def test_flags_of_any_kind_are_asked_about_and_can_be_said(name: str, bad: Any, good: Any, key: str) -> None:
+    made = table(**{name: few(bad, good)})
+    with pytest.raises(IsiwError, match=rf"--column \"{key}={name.replace('(', '.').replace(')', '.')}\""):
+        read_people(made, EMPTY_IS_ALONE)
+    (person,) = read_people(made, EMPTY_IS_ALONE.saying(columns={key: name}))
+    assert [trial.told for trial in person.trials] == KEPT
+
+
+def test_a_column_without_a_name_is_read_for_remarks() -> None:
+    with pytest.raises(IsiwError, match=r"row 5 of the column 'column 3' .* does not count"):
+        read_people(table(**{"": few("artefact", "")}), EMPTY_IS_ALONE)
+    assert read_people(table(**{"": [""] * 48}), EMPTY_IS_ALONE)[0].unused == ()
+
+
+@pytest.mark.parametrize("cell", ["<0.2", "none", "n.d.", "no MEP"])
+def test_words_for_no_mep_are_asked_about(cell: str) -> None:
+    with pytest.raises(IsiwError, match=r"row 5 of .* 0 is no MEP, or one below the detection limit"):
+        read_people(table([cell if n == 4 else mep for n, mep in enumerate(MEPS)]), EMPTY_IS_ALONE)
+
+
+@pytest.mark.parametrize(("meps", "says"), [(np.minimum(MEPS, 0.8), "saturated"), (np.maximum(MEPS, 0.45), "limit")])
+def test_amplitudes_that_are_cut_off_are_asked_about(meps: Any, says: str) -> None:
+    with pytest.raises(IsiwError, match=rf"seem to be .*{says}.*{WAY_OUT}"):
+        read_people(table(meps), EMPTY_IS_ALONE)
+    assert len(trials_of(read_people(table(meps), EMPTY_IS_ALONE.saying(where={"MEP (mV)": "*"})))) == 48
+    assert len(trials_of(read_people(table(MEPS.round(1)), EMPTY_IS_ALONE))) == 48
+
+
+@pytest.mark.parametrize("label", ["Mean block {}", "MW B{}", ""])
+def test_means_between_blocks_are_no_tms_alone(label: str) -> None:
+    made, parts = table(label=""), list[pd.DataFrame]()
+    for n, first in enumerate((0, 24)):
+        mean = pd.DataFrame(
+            {"MEP (mV)": [round(float(MEPS[first : first + 24].mean()), 5)], "label": label.format(n + 1)}
+        )
+        parts += [made.iloc[first : first + 24], mean]
+    with pytest.raises(IsiwError, match=r"row 25 .*(is none of a trial|seems to be a mean)"):
+        read_people(pd.concat(parts, ignore_index=True), EMPTY_IS_ALONE)
+
+
+def test_a_tap_alone_may_be_a_word_among_the_isis_and_a_long_isi_before_the_tap_is_asked_about() -> None:
+    cells = ["tap alone" if alone and n < 12 else "TMS" if alone else isi
+             for n, (alone, isi) in enumerate(zip(ALONE, ISIS, strict=True))]  # fmt: skip
+    (person,) = read_people(table(**{"ISI (ms)": cells}), IMPACT)
+    assert [trial.tap_alone for trial in person.trials] == [cell == "tap alone" for cell in cells]
+    with pytest.raises(IsiwError, match="have the ISI -100 ms, which may stand for TMS alone"):
+        read_people(table(**{"ISI (ms)": [-100.0 if n in {3, 7, 11} else 10.0 + n for n in range(48)]}), IMPACT)
+
+
+def test_units_are_read_below_words_and_in_their_peak_to_peak_spelling(tmp_path: Path) -> None:
+    rows = "".join(f"{isi:g};{mep}\n" for isi, mep in zip(ISIS[~ALONE], MEPS[~ALONE], strict=True))
+    for head in ("ISI;MEP\n(ms);amplitude (mV)\n", "ISI (ms);MEP (mVpp)\n", "ISI (ms);MEP (mV p-p)\n"):
+        (tmp_path / "P01.csv").write_text(head + rows)
+        assert [mep for _, mep in trials_of(read_people(tmp_path / "P01.csv", IMPACT))] == MEPS[~ALONE].tolist()
+
+
+@pytest.mark.parametrize(
+    ("names", "factor", "unit", "says"),
+    [({"isi": "ISI (s)"}, 1.0, "ms", r"say --unit ms and --where \"ISI \(s\)=\*\""),
+     ({"mep": "MEP (mV)"}, 1e3, "uV", r"by --unit, and --where \"MEP \(mV\)=\*\"")],
+)  # fmt: skip
+def test_the_first_question_about_a_wrong_unit_in_a_name_has_the_whole_way_out(
+    names: dict[str, str], factor: float, unit: str, says: str
+) -> None:
+    made = table(factor * MEPS, **names)
+    with pytest.raises(IsiwError, match=says):
+        read_people(made, EMPTY_IS_ALONE)
+    said = EMPTY_IS_ALONE.saying(units=(unit,), where={next(iter(names.values())): "*"})
+    assert len(trials_of(read_people(made, said))) == 48
+
+
+def test_excel_may_show_a_part_of_a_number_and_notes_leave_out(tmp_path: Path) -> None:
+    for n, (shown, note) in enumerate((("0.000,", ""), ("General", "EK:\ncoil moved, repeat"))):
+        with pd.ExcelWriter(tmp_path / f"P{n}.xlsx", engine="openpyxl") as book:
+            table()[~ALONE].to_excel(book, index=False)
+            for cells in book.book.active.iter_rows(min_row=2, min_col=2):
+                cells[0].number_format = shown
+            if note:
+                book.book.active["B8"].comment = openpyxl.comments.Comment(note, "EK")
+    for n, says in enumerate((r"'MEP \(mV\) \(÷1000\)' are multiplied", "row of .* left out by a note; got 'row 8'")):
+        with pytest.raises(IsiwError, match=says):
+            read_people(tmp_path / f"P{n}.xlsx", IMPACT)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [({"badTrials": 7}, "'badTrials' is not as long"), ({"badsweeps": [3, 9]}, "'badsweeps' is not as long"),
+     ({"gain": 1000.0}, "'gain' of .* says a factor"), ({"info": "MEP in % of control"}, "relative by what the title")],
+)  # fmt: skip
+def test_what_stands_beside_vectors_of_matlab_is_asked_about(more: dict[str, Any], says: str, tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "P01.mat", {"isi_ms": ISIS, "mep_mv": MEPS, **more})
+    with pytest.raises(IsiwError, match=says):
+        read_people(tmp_path / "P01.mat", EMPTY_IS_ALONE)
+    scipy.io.savemat(tmp_path / "P01.mat", {"isi_ms": ISIS, "mep_mv": MEPS, "badTrials": [], "n_bad": 3, "gain": 1.0})
+    assert len(trials_of(read_people(tmp_path / "P01.mat", EMPTY_IS_ALONE))) == 48
