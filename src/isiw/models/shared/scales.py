@@ -43,8 +43,10 @@ class Scale(NamedTuple):
 
     def normal(self, z: Number) -> Number:
         """The quantity at some latents, same shape."""
-        linear: Number = self.median + self.sd * z
-        return linear + self.tail * z**3 if self.tail else linear
+        found: Number = z * self.sd + self.median
+        if self.tail:
+            found = found + self.tail * z**3
+        return found
 
 
 def scale(what: str, given: object, *, positive: bool = True, tailed: bool = True) -> Scale:
