@@ -102,7 +102,7 @@ def saving(line: Mapping[str, Any]) -> str:
 
 
 def choosing(compared: pd.DataFrame) -> str:
-    """How many other rows are above and below the default, and the best of them.
+    """How many other rows are above and below the default, and the best of those that have the most people.
 
     Args:
         compared: as `isiw.studies.differences` gives it against the default, of one cohort and mark.
@@ -111,14 +111,15 @@ def choosing(compared: pd.DataFrame) -> str:
     if not len(known):
         return f"Of the ways to choose and to estimate nothing can be said after {EARLY} stimuli: too few people."
     below, above = known[known["high"] < 0], known[known["low"] > 0]
-    best = known.loc[known["difference"].idxmax()]
+    best = known.loc[known["difference"].where(known["people"] == known["people"].max()).idxmax()]
     named = f" ({_listed(above['strategy'])})" if len(above) else ""
     rest = len(known) - len(below) - len(above)
     return (
         f"After {EARLY} stimuli, of {len(known)} other ways to choose and to estimate, {len(below)} have a lower mean "
         f"F1 than the default on the same people of `{MAIN}`, {len(above)} a higher one{named}, and {rest} cannot be "
-        f"told from it (intervals that hold together with 95 %); the best of the others is `{best['strategy']}` "
-        f"({signed(best['difference'])}, {signed(best['low'])} to {signed(best['high'])}, {best['people']} people)."
+        f"told from it (intervals that hold together with 95 %); the best of those on the most people is "
+        f"`{best['strategy']}` ({signed(best['difference'])}, {signed(best['low'])} to {signed(best['high'])}, "
+        f"{best['people']} people)."
     )
 
 

@@ -235,6 +235,12 @@ def test_a_comparison_with_one_person_says_that_it_cannot() -> None:
     assert "50 % of the default's answers" in trusting(main)
 
 
+def test_the_best_of_the_others_is_one_of_those_that_most_people_have() -> None:
+    rows = {"strategy": ["few", "many", "worse"], "people": [10, 200, 200], "difference": [0.2, 0.01, -0.1]}
+    compared = pd.DataFrame({**rows, "low": [-0.3, -0.02, -0.15], "high": [0.7, 0.04, -0.05]})
+    assert "best of those on the most people is `many` (+.01, −.02 to +.04, 200 people)" in choosing(compared)
+
+
 def test_what_a_gaussian_process_says_of_itself_is_what_was_measured() -> None:
     rows = pd.DataFrame(json.loads(FAMILY.read_text(encoding="utf-8"))["All rows"])
     named = [name for name in isiw.list_strategies() if name.startswith("gp-")]
