@@ -12,10 +12,10 @@ pulses, but with a prior that knows what pulses could at most teach (the person'
 what they cannot (the law of the cohort's windows), and both. With `--wrong` the pulses, stated as of the same level,
 are the right ones, and of each curve of `wrong_curves`. `--recorded` examines people whose MEPs were recorded instead,
 the pulses being of the law that pairs are drawn from, or with `--banks coils` of the other half of the pulses
-(`benchmarks.recorded_people`). All F1 are of the same people,
-and pairs have the same noise. Standard errors are by person. Rows are kept beside `--out` as people are done, and the
-same command continues where it was interrupted. Reported people come from seed 190,000 on; seeds below 1,000 are for
-work.
+(`benchmarks.recorded_people`). With `--to-stopping 60` each goes on until the session's own rule ends it, after 60
+pairs at the latest. All F1 are of the same people, and pairs have the same noise. Standard errors are by person. Rows
+are kept beside `--out` as people are done, and the same command continues where it was interrupted. Reported people
+come from seed 190,000 on; seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
@@ -50,6 +50,10 @@ from isiw.subjects.subject import SimulatedSubject
 from isiw.trials import Status, Trial
 
 MARKS: Final = 10, 20
+STOP_PAIRS, STOP_F1 = "stop pairs", "stop F1"
+MORE: Final = {f"F1 {mark}": f"gain {mark}" for mark in MARKS} | {STOP_PAIRS: "more pairs", STOP_F1: "gain at the stop"}
+"""What differences to nothing given are called, by their figures."""
+
 SPACE: Final = isiw.VALVE_SPACE
 OVER_PCT_RMT: Final = 90.0, 140.0
 NEARLY: Final = 0.03
@@ -217,12 +221,21 @@ def strategies(own: Examined, other: Examined, seed: int, pulses: list[int], wha
     return ways
 
 
-def session(subject: SimulatedSubject, seed: int, strategy: Strategy) -> dict[str, float]:
-    """After each of `MARKS` pairs the F1, the F1 expected, and what is said against pulses, pairs and law."""
+def session(subject: SimulatedSubject, seed: int, strategy: Strategy, most: int = 0) -> dict[str, float]:
+    """After each of `MARKS` pairs the F1, the F1 expected, and what is said against pulses, pairs and law.
+
+    Args:
+        subject: the person.
+        seed: of the responses.
+        strategy: before the first pair.
+        most: pairs after which it ends if its own rule has not ended it; 0 does not ask the rule.
+    """
     responder, truth, found = subject.begin(seed), subject.window(SPACE), dict[str, float]()
-    for pair in range(1, MARKS[-1] + 1):
+    for pair in range(1, max(MARKS[-1], most) + 1):
         response = responder.respond(strategy.ask(), SPACE.reference)
         strategy.learn(Trial.of(response.isi_ms, response.mep_mv))
+        if most and STOP_PAIRS not in found and (pair == most or strategy.decision().stop):
+            found |= {STOP_PAIRS: pair, STOP_F1: f1(strategy.estimate(), truth, SPACE)}
         if pair in MARKS:
             estimate = strategy.estimate()
             misfit, change = estimate.misfit, estimate.change
@@ -233,6 +246,8 @@ def session(subject: SimulatedSubject, seed: int, strategy: Strategy) -> dict[st
                 f"no fit {pair}": float(changed or (misfit is not None and misfit.of_curve)),
                 f"law doubted {pair}": float(misfit is not None and misfit.of_law),
             }
+        if pair >= MARKS[-1] and STOP_PAIRS in found:
+            break
     return found
 
 
@@ -263,14 +278,15 @@ def compared(rows: pd.DataFrame) -> pd.DataFrame:
     table = []
     for known, part in rows.groupby("known", sort=False):
         figures = part.drop(columns=["known", "number", "whose"]).mean().to_dict()
-        for mark in MARKS:
-            gain = part[f"F1 {mark}"] - part["number"].map(usual[f"F1 {mark}"])
-            figures |= {f"gain {mark}": gain.mean(), f"gain {mark} SE": error_by_person(gain, part["whose"])}
+        for column, name in MORE.items():
+            if column in part:
+                more = part[column] - part["number"].map(usual[column])
+                figures |= {name: more.mean(), f"{name} SE": error_by_person(more, part["whose"])}
         table.append({"known": known, "people": len(part), **figures})
     return pd.DataFrame(table)
 
 
-def main(
+def main(  # noqa: PLR0913 - options of a command line
     people: Annotated[int, typer.Option(help="People.")] = 50,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 200_000,
     pulses: Annotated[list[int] | None, typer.Option(help="How many pulses; repeat it for several.")] = None,
@@ -280,6 +296,7 @@ def main(
     wrong: Annotated[bool, typer.Option("--wrong", help="Pulses of wrong curves beside the right one.")] = False,
     recorded: Annotated[bool, typer.Option("--recorded", help="People whose MEPs were recorded.")] = False,
     banks: Annotated[str, typer.Option(help="What a bank of theirs is: curves or coils.")] = "curves",
+    to_stopping: Annotated[int, typer.Option(help="Until the own rule stops, at most so many pairs; 0: 20.")] = 0,
 ) -> None:
     """Print how the sessions compare."""
     torch.set_num_threads(1)
@@ -291,13 +308,15 @@ def main(
     cohort, counts = examined(people, seed, cast("Banks", banks) if recorded else None), pulses or [30, 60]
     what = "known" if known else "wrong" if wrong else "right"
     whose = f"recorded-{banks}" if recorded else "recruitment"
-    folder = out.with_suffix(f".{what}-{'-'.join(map(str, counts))}-{whose}-{seed}.rows")
+    stops = f"-{to_stopping}" if to_stopping else ""
+    folder = out.with_suffix(f".{what}-{'-'.join(map(str, counts))}-{whose}-{seed}{stops}.rows")
 
     def row_of(number: int) -> pd.DataFrame:
         own, other = cohort[number]
         ways = strategies(own, other, seed + number, counts, what).items()
         who = {"number": number, "whose": own.whose}
-        return pd.DataFrame([{"known": w, **who, **session(own.subject, seed + number, s)} for w, s in ways])
+        found = ((way, session(own.subject, seed + number, strategy, to_stopping)) for way, strategy in ways)
+        return pd.DataFrame([{"known": way, **who, **figures} for way, figures in found])
 
     rows = [kept(folder / f"{number}.parquet", partial(row_of, number)) for number in range(people)]
     table = compared(pd.concat(rows, ignore_index=True))

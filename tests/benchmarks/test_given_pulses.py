@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from benchmarks.given_pulses import Curve, Examined, compared, examined, given, main, wrong_curves
+from benchmarks.given_pulses import Curve, Examined, compared, examined, given, main, session, wrong_curves
 
 import isiw
 from known import known
@@ -62,6 +63,19 @@ def test_gains_are_of_the_same_people() -> None:
     table = compared(pd.DataFrame(rows)).set_index("known")
     assert table["gain 20"].to_dict() == pytest.approx({"nothing": 0.0, "60 pulses": 0.15})
     assert table.loc["60 pulses", "gain 20 SE"] == pytest.approx(0.035, abs=0.003)
+
+
+def test_a_session_goes_on_to_its_own_stop_or_to_the_last_pair() -> None:
+    (subject,) = isiw.subjects.cohort("gaussian", 1, 0)
+    until: dict[str, Any] = {"particles": 100, "stop_gain": 0.0, "stop_no_window": 1.0}
+    sure = isiw.make_strategy("default", seed=1, **until, stop_width_ms=500.0, stop_expected_f1=1.0)
+    never = isiw.make_strategy("default", seed=1, **until, stop_width_ms=1.0, stop_expected_f1=1.0)
+    early, last = session(subject, 1, sure, 25), session(subject, 1, never, 25)
+    assert early["stop pairs"] < 20  # it goes on to the last mark all the same
+    assert early["F1 20"] == last["F1 20"]
+    assert last["stop pairs"] == 25
+    rows = [{"known": "nothing", "number": 0, "whose": 0, **last}, {"known": "60", "number": 0, "whose": 0, **early}]
+    assert compared(pd.DataFrame(rows))["more pairs"].tolist() == [0.0, early["stop pairs"] - 25]
 
 
 def test_without_the_recordings_it_says_so(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -136,6 +137,14 @@ def test_stimuli_that_added_little_are_the_last(first: float, told: int, probabi
     decision = SmallGain(0.02)(expecting(0.1, *f1s, told=told, probability=probability))
     assert decision.stop == stop
     assert f"added {'0.10' if first < 0.75 else 'less than 0.02'} to the expected F1" in decision.reason
+
+
+@pytest.mark.parametrize(("told", "given", "stop"), [(17, 60, True), (16, 60, False), (26, 30, True), (17, 30, False)])
+def test_pulses_over_the_curve_make_up_for_pairs_before_which_a_small_gain_does_not_count(
+    told: int, given: int, *, stop: bool
+) -> None:
+    so_far = expecting(*np.linspace(0.79, 0.8, 11).tolist(), told=told, probability=0.98)
+    assert SmallGain(0.02)(replace(so_far, given=given)).stop == stop
 
 
 def test_a_gain_of_zero_lets_a_session_go_on_also_where_the_expected_f1_falls() -> None:

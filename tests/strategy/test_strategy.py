@@ -36,7 +36,7 @@ class Least:
     """A rule that says what it is told of progress."""
 
     def __call__(self, progress: Progress) -> StopDecision:
-        return StopDecision(stop=False, reason=f"{progress.delivered} of {progress.told}")
+        return StopDecision(stop=False, reason=f"{progress.delivered} of {progress.told}, {progress.given} given")
 
 
 def play(strategy: Strategy, meps_mv: list[float]) -> list[float]:
@@ -343,7 +343,25 @@ def test_tms_alone_is_none_of_the_forty_pairs_from_which_on_a_small_gain_stops()
     for _ in range(5):
         strategy.learn(Trial.of(None, 0.02))
     strategy.learn(Trial.of(100.0, 0.02))
-    assert strategy.decision().reason == "1 of 1"
+    assert strategy.decision().reason == "1 of 1, 0 given"
+
+
+def test_pulses_of_a_stated_intensity_before_the_first_pair_are_counted_as_given() -> None:
+    usual = make_strategy("default", particles=100)
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, Least())
+    strategy.tell(None, 0.02)  # of the session's own intensity
+    for pct_rmt in (110, 120):
+        strategy.tell(None, 0.4, intensity_pct_rmt=pct_rmt)
+    strategy.tell(strategy.ask(), 0.3)
+    strategy.tell(None, 0.4, intensity_pct_rmt=110)
+    assert strategy.decision().reason == "1 of 1, 2 given"
+
+
+def test_a_model_without_a_law_of_other_intensities_was_given_nothing() -> None:
+    usual = make_strategy("gp-variance")
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, Least())
+    strategy.tell(None, 0.4, intensity_pct_rmt=120)
+    assert strategy.decision().reason == "0 of 0, 0 given"
 
 
 def test_a_design_goes_on_with_its_plan_however_often_a_trial_is_lost() -> None:

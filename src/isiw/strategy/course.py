@@ -85,7 +85,8 @@ class Course:
     """The trials of b people so far, the posterior, and what is asked of each next.
 
     `alone` of the `told` trials were TMS alone; `earlier` are the states that the stopping rule looks back on. What was
-    learnt before the first ask, `known` pairs and `known_all` trials, counts for no plan and no budget.
+    learnt before the first ask, `known` pairs and `known_all` trials, counts for no plan and no budget. Pulses of a
+    stated intensity before the first pair are `given`.
     """
 
     method: Method
@@ -98,6 +99,7 @@ class Course:
     paired: bool = False
     known: int = 0
     known_all: int = 0
+    given: int = 0
 
     def begun_here(self) -> Course:
         """The course whose first trial is the next one, whatever was learnt before."""
@@ -121,6 +123,7 @@ class Course:
             posterior=self.method.model.update(self.posterior, observation) if learnt else self.posterior,
             told=self.told + 1,
             alone=self.alone + alone,
+            given=self.given + (alone and learnt and shift is not None and self.known + self.paired_trials == 0),
             earlier=tuple(e.without_posterior() if len(e.made) == self.people else e for e in self.past),
             paired=not alone,
         )
@@ -232,7 +235,8 @@ class Course:
         """The decision to stop with one person or not, with its reason."""
         past = tuple(each.estimate(person) for each in self.past)
         estimate = self.estimate(person).noting(silent=silent)
-        progress = Progress(self.paired_trials + mistrials, self.paired_trials, estimate, past=past)
+        pairs = self.paired_trials
+        progress = Progress(pairs + mistrials, pairs, estimate, past=past, given=self.given)
         decision = self.method.stopping(progress)
         if not isinstance(decision, StopDecision):
             raise StrategyError(

@@ -12,12 +12,16 @@ from isiw.estimate import WindowEstimate
 
 @dataclass(frozen=True)
 class Progress:
-    """A session's delivered pairs, mistrials included, those learnt, and the estimates now and before."""
+    """A session's delivered pairs, mistrials included, those learnt, and the estimates now and before.
+
+    `given` is how many pulses over the recruitment curve were learnt before the first pair.
+    """
 
     delivered: int
     told: int
     estimate: WindowEstimate
     past: tuple[WindowEstimate, ...] = ()
+    given: int = 0
 
 
 class StoppingRule(Protocol):

@@ -18,6 +18,9 @@ from isiw.text.sanitize import counted
 MOST_BY_TIME: Final = 0.05
 """No session stops on a window while changes with time explain it all with more probability than this."""
 
+OF_GIVEN: Final = 0.3
+"""As how much of a pair a pulse over the recruitment curve counts that was given before the pairs (decision 61)."""
+
 
 def _stop_unless_by_time(kind: StopKind, estimate: WindowEstimate, reason: str) -> StopDecision:
     """The decision to stop, unless time alone may explain a window."""
@@ -133,7 +136,10 @@ class ExpectedF1(Checked):
 
 @dataclass(frozen=True)
 class SmallGain(Checked):
-    """Stop when the `last` stimuli added less than `gain` to the expected F1, as the next would; never at 0."""
+    """Stop when the `last` stimuli added less than `gain` to the expected F1, as the next would; never at 0.
+
+    It takes `min_told` pairs that were learnt, or fewer where pulses have taught the recruitment curve beforehand.
+    """
 
     gain: Share = 0.02
     last: Count = 10
@@ -155,7 +161,7 @@ class SmallGain(Checked):
         size = f"less than {self.gain:g}" if gained < self.gain else f"{gained:.2f}"
         added = f"added {size} to the expected F1"
         small = self.gain > 0 and gained < self.gain and now.probability >= self.min_probability
-        if small and progress.told >= self.min_told:
+        if small and progress.told + OF_GIVEN * progress.given >= self.min_told:
             reason = f"Another {self.last} stimuli would add little: the last {self.last} {added}."
             return _stop_unless_by_time(StopKind.SMALL_GAIN, now, reason)
         since = f"the last {self.last} stimuli {added}"

@@ -106,8 +106,8 @@ class Stopping(Checked):
         stop_width_ms: stop when a window is 90 % probable and the 90 % credible intervals of both edges are at most
             this wide [ms], under every kind of noise that is still probable if the model weighs more than one.
         stop_expected_f1: stop when the expected F1 of the reported window is at least this; never at 1.
-        stop_gain: from 35 pairs on, stop when a window is probable (.97), and the last ten stimuli added less than
-            this to the expected F1; never at 0.
+        stop_gain: from 35 pairs on, or fewer by .3 for each pulse over the recruitment curve given first, stop when a
+            window is probable (.97), and the last ten stimuli added less than this to the expected F1; never at 0.
         stop_no_window: stop when "there is no window" is at least this probable.
     """
 
