@@ -64,6 +64,7 @@ def test_the_example_of_lsl_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert all(trial.mep_mv is not None and 0.25 < trial.mep_mv < 0.35 for trial in result.trials.told)
 
 
+@pytest.mark.slow
 def test_the_example_of_functions_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

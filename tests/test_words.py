@@ -46,6 +46,7 @@ def test_no_message_has_one_of_the_worst_phrases() -> None:
     assert [each for each in said if PHRASES.search(each[1]) or CONTINUING.search(each[1])] == []
 
 
+@pytest.mark.slow
 def test_no_name_in_code_has_a_word_that_stands_for_something_else() -> None:
     found = {f"{name(path)}: {each}" for path in SOURCES for each in read(path)[1] - KEPT if NAMES.search(each)}
     assert found == set()

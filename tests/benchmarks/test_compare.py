@@ -185,6 +185,7 @@ def person(number: int) -> isiw.subjects.SimulatedSubject:
     return isiw.subjects.cohort("gaussian", 3, seed=1)[number]
 
 
+@pytest.mark.slow
 def test_the_first_people_come_first_and_the_others_later(tmp_path: Path) -> None:
     plan, ran = plan_in(tmp_path), list[str]()
     run_part(replace(plan, first=1), FAST, "gaussian", ran.append)

@@ -75,6 +75,7 @@ def test_a_cohort_whose_windows_it_does_not_know_is_refused() -> None:
         spans_of("two-peak", 1)
 
 
+@pytest.mark.slow
 def test_its_law_of_the_mep_is_the_simulators_artefacts_included() -> None:
     subject = replace(cohort("outliers", 1, 3)[0], outlier_probability=0.3, jitter_reported=True)
     edges_mv, mass = outcome_table(subject)

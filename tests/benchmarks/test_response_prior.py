@@ -125,6 +125,7 @@ def test_the_fitted_prior_is_the_defaults_but_for_six_numbers() -> None:
     assert Fit(astuple(today.noise), TODAY).prior() == today
 
 
+@pytest.mark.slow
 def test_a_person_is_judged_by_a_fit_to_the_others_with_all_coils_left_out() -> None:
     evidence = made_up(5.0)
     evidence.by_kind[:, evidence.persons == 3, KINDS.index("all_or_none")] += 50.0

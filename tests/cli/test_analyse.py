@@ -131,6 +131,7 @@ def test_earlier_trials_of_a_visit_count_for_its_limit_lost_ones_among_them(isiw
     assert len(library.read_session("12.mcap").table) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("read_here")
 def test_a_session_is_run_with_earlier_trials(isiw: Command, people: Path) -> None:
     made = ("--reference", "impact", "--config", "few.toml", "--simulated", "--only", "A", "-o", "A.mcap")
@@ -179,6 +180,7 @@ def test_a_person_whose_code_is_spelt_in_two_ways_is_not_replayed_by_one_of_them
     assert "differs from another one only in case" in done.output
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("read_here")
 def test_a_replay_takes_every_option_that_a_file_may_need(isiw: Command, people: Path) -> None:
     rows = pd.read_csv(people)

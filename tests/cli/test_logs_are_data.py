@@ -63,6 +63,7 @@ def test_a_word_of_another_version_in_the_run_section_stops_nothing(isiw: Comman
     assert "not known" not in result.output
 
 
+@pytest.mark.slow
 def test_recordings_are_opened_only_where_the_operator_names_them(
     isiw: Command, short: Path, recordings_folder: Path
 ) -> None:
@@ -108,6 +109,7 @@ def test_a_part_of_the_header_that_cannot_be_read_stops_what_needs_it_only(isiw:
         library.resume(log, library.CallbackDevice(lambda *_: nothing, library.DeviceInfo("rig", reference="valve")))
 
 
+@pytest.mark.slow
 def test_a_log_whose_whole_header_is_odd_is_drawn_and_exported(isiw: Command, log: Path) -> None:
     changed_header(log, config="none", **ODD)
     for arguments in (("plot", log), ("report", log, "-o", "r.html")):

@@ -83,6 +83,7 @@ def test_a_prior_and_its_picture_are_replaced_only_where_that_is_asked_for(
     assert picture.read_bytes() != b"kept"
 
 
+@pytest.mark.slow
 def test_a_session_is_run_with_a_lab_prior_and_its_log_holds_the_numbers(isiw: Command, lab: Any, folder: Path) -> None:
     result = isiw("run", "short.toml", "--prior", lab, "--log", "with.mcap")
     assert result.exit_code == 0, result.output

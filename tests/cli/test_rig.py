@@ -81,6 +81,7 @@ def begun(ended: Path, tmp_path: Path) -> Path:
     return tmp_path / "session.toml"
 
 
+@pytest.mark.slow
 def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isiw: Command, begun: Path) -> None:
     changed(begun, "max_pulses = 3", "max_pulses = 5\nmax_coil_c = 40.0")
     hot = isiw("resume", "s.mcap", begun)
@@ -110,6 +111,7 @@ def test_a_session_that_its_limits_have_ended_says_which_file_to_change(isiw: Co
         assert output.endswith(f".mcap {begun}\n")
 
 
+@pytest.mark.slow
 def test_a_session_that_was_over_says_so_when_it_is_resumed_and_how_the_person_goes_on(
     isiw: Command, begun: Path
 ) -> None:

@@ -146,6 +146,7 @@ def test_an_event_that_was_never_found_is_not_in_the_table() -> None:
     assert table[["mean_ms", "low_ms", "high_ms", "n"]].to_numpy().tolist() == [[681.0, 680.0, 682.0, 2.0]]
 
 
+@pytest.mark.slow
 def test_the_pooled_sd_leaves_the_means_of_the_sets_out() -> None:
     study = study_preset("subject4", taps=50, isi_ms=(30.0, 60.0), seed=3)
     shifted = type(study)(
@@ -185,6 +186,7 @@ def test_each_sweep_of_a_study_has_its_isi() -> None:
         study_sweeps("three taps", sweeps, [50.0, 50.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["subject1", "subject2", "subject3", "subject4"])
 def test_without_an_accelerometer_the_hit_is_found_in_the_emg_to_within_what_people_differ_by(name: str) -> None:
     robot = Tapper(lambda _: NoResponse(), name, TapperSettings(trigger="impact"))

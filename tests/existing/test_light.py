@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 from isiw.config.run import load_config
 from isiw.existing.batch import way_of
 from isiw.existing.layout import Layout
@@ -12,6 +14,7 @@ from isiw.existing.layout import Layout
 ONLY_ANALYSIS = {"matplotlib", "numba", "scipy", "torch", "mne", "isiw.log.reader", "isiw.config.run"}
 
 
+@pytest.mark.slow
 def test_neither_the_command_nor_the_process_that_reads_loads_what_only_an_analysis_needs() -> None:
     script = "import sys, isiw.cli, isiw.existing.batch, isiw.existing.child; print(*sys.modules)"
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)  # noqa: S603 - own script

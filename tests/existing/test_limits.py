@@ -156,6 +156,7 @@ def numbered_rows() -> None:
     doubts._require_ascending(Columns.found(table, IMPACT, "P01.csv"))  # noqa: SLF001 - this part alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "read",
     [

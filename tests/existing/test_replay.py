@@ -76,6 +76,7 @@ def test_trials_that_answer_nothing_are_refused(isis_ms: list[float], mep_mv: fl
         replay(Delivered(table, "impact"), space=SPACE)
 
 
+@pytest.mark.slow
 def test_a_replay_of_few_trials_says_what_it_found_after_the_last() -> None:
     said = str(replay(swept(1), ["incremental"], space=SPACE, seeds=1, trials=3))
     assert "incremental  3: " in said

@@ -64,6 +64,7 @@ def data_set(log: Path, tmp_path: Path) -> Path:
     return tmp_path / "out"
 
 
+@pytest.mark.slow
 def test_the_official_validator_finds_no_error(data_set: Path) -> None:
     assert errors_of(data_set) == []
 
@@ -81,6 +82,7 @@ def test_a_pseudonymised_data_set_is_valid_and_has_no_logs(log: Path, tmp_path: 
     assert list((tmp_path / "out").rglob("*.mcap")) == []
 
 
+@pytest.mark.slow
 def test_the_validator_would_find_an_error(data_set: Path) -> None:
     (sidecar,) = data_set.rglob("*_emg.json")
     sidecar.write_text("{}")

@@ -36,6 +36,7 @@ def content(record: SessionRecord) -> tuple[object, ...]:
     return record.header, record.history, waveforms
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["finished_log", "broken_log"])
 def test_no_flipped_bit_changes_what_is_read_unnoticed(kind: str, request: pytest.FixtureRequest) -> None:
     log = request.getfixturevalue(kind)

@@ -20,6 +20,7 @@ def changes(factor: float, drift: Drift | None = None, plan: InterventionPlan | 
     return [change_of(visit(number, factor, drift, plan).pulses, pairs=50) for number in range(PEOPLE)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.6, 1.0, 2.0])
 def test_the_change_is_found_in_size_and_direction(factor: float) -> None:
     found = changes(factor)
@@ -31,6 +32,7 @@ def test_the_change_is_found_in_size_and_direction(factor: float) -> None:
     assert (np.mean(more) > 0.5) == (factor > 1) or factor == 1.0
 
 
+@pytest.mark.slow
 def test_a_level_that_drifts_makes_the_interval_wider() -> None:
     def width(found: list[AfterEffect]) -> float:
         return float(np.median([math.log(effect.pooled.factor.high / effect.pooled.factor.low) for effect in found]))
@@ -38,6 +40,7 @@ def test_a_level_that_drifts_makes_the_interval_wider() -> None:
     assert width(changes(1.0, Drift(0.97, 0.15, ()))) > 1.15 * width(changes(1.0))
 
 
+@pytest.mark.slow
 def test_without_a_drift_the_interval_is_within_that_which_allows_for_one() -> None:
     for effect in changes(1.5):
         wide, narrow = effect.pooled.factor, effect.pooled.steady
@@ -59,6 +62,7 @@ def test_pulses_that_are_like_the_one_before_say_less_of_a_change() -> None:
     assert width(sorted(by_turns)) > 1.1 * width(by_turns)
 
 
+@pytest.mark.slow
 def test_pulses_at_several_intensities_are_one_answer_and_means_are_compared_at_the_same_ones() -> None:
     plan = InterventionPlan(pairs=50, tests_pct_rmt=(110.0, 120.0, 130.0))
     ratios = [math.log(effect.pooled.ratio) for effect in changes(1.6, plan=plan) if effect.pooled.ratio is not None]

@@ -51,6 +51,7 @@ def test_a_session_at_or_above_the_threshold_is_no_first_step(tmp_path: Path) ->
         above(loud)
 
 
+@pytest.mark.slow
 def test_a_window_of_another_day_is_less_certain_than_of_the_same_visit(tmp_path: Path) -> None:
     record, other_day = below(tmp_path / "sub.mcap"), isiw.priors.DayToDay()
     true = gaussian_person().window(IMPACT)

@@ -45,6 +45,7 @@ def learnt(correlation: float, people: int = 12, seed: int = 0) -> tuple[Slope, 
     return slopes_of(visits, block, LAW, np.random.default_rng(1))
 
 
+@pytest.mark.slow
 def test_a_height_that_windows_go_with_is_learnt_and_nothing_of_an_age_that_all_share() -> None:
     (slope,) = learnt(0.85, people=20)
     assert slope.covariate == "height_cm"

@@ -129,6 +129,7 @@ def test_a_change_that_was_noted_is_one_to_whatever_learns_the_session(tmp_path:
     assert priors.after(read_session(path)).changes == Prior().changes  # the next day has none of it
 
 
+@pytest.mark.slow
 def test_a_window_that_stayed_probably_did_not_move_and_one_elsewhere_did(first: Any, folder: Path) -> None:
     stayed = read_session(write_log(folder / "stayed.mcap", person(EARLY_MS + 8.0), trials=18, seed=3))
     gone = read_session(write_log(folder / "gone.mcap", person(LATE_MS), trials=18, seed=3))

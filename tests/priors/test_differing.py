@@ -47,6 +47,7 @@ def found(records: list[SessionRecord]) -> list[Difference]:
     return differences(records)
 
 
+@pytest.mark.slow
 def test_a_window_that_is_later_is_said_to_be_later(found: list[Difference]) -> None:
     assert known(found[0].starts_later) > 0.95
     assert known(found[0].ends_later) > 0.95

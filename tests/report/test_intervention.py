@@ -51,6 +51,7 @@ def test_a_page_shows_the_course_of_the_window_that_was_followed() -> None:
         assert said in words
 
 
+@pytest.mark.slow
 def test_a_course_is_what_was_known_at_each_pair(tmp_path: Path) -> None:
     session(tmp_path / "s.mcap", intervention(arms=(Arm.WINDOW,), before=6)).run()
     record = read_session(tmp_path / "s.mcap")
@@ -78,6 +79,7 @@ def test_too_few_pulses_are_said_and_no_change_is_drawn() -> None:
     assert "all blocks" not in page.words
 
 
+@pytest.mark.slow
 @pytest.mark.needs_pictures
 def test_pulses_of_several_intensities_are_told_apart() -> None:
     pulses = [

@@ -39,6 +39,7 @@ def outcome(answer: dict[str, Any], **more: Any) -> dict[str, Any]:
     return {"trial": answer["trial"], "isi_ms": answer["isi_ms"], "mep_mv": mep_mv(answer["isi_ms"]), **more}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keys", [("A", "B"), ("A", None), (None, None)], ids=str)
 def test_two_clients_that_name_the_same_trial_are_not_both_given_it(
     client: httpx.Client, keys: tuple[str | None, str | None], tmp_path: Path
@@ -125,6 +126,7 @@ def test_a_takeover_ends_the_trial_of_the_earlier_client_and_its_key(
     assert [event.client for event in record.events if event.kind == "client"] == ["A", "B"]
 
 
+@pytest.mark.slow
 def test_what_a_client_was_given_before_a_takeover_keeps_the_interval(client: httpx.Client) -> None:
     session = created(client, limits={"min_iti_s": 1.0}, client="A")
     done(asked(client, session, 0, "A"))

@@ -260,6 +260,7 @@ def test_doubts_come_with_the_answer_and_are_logged(client: httpx.Client, sessio
     assert [event.kind for event in read_session(tmp_path / "P07.mcap").events] == ["doubt"]
 
 
+@pytest.mark.slow
 def test_the_inter_trial_interval_is_waited_for_or_the_client_told_how_long_it_is(client: httpx.Client) -> None:
     begun_s = time.monotonic()  # the interval counts from the creation of the session on
     session = created(client, limits={"min_iti_s": 1.0})

@@ -273,6 +273,7 @@ def test_a_session_that_is_busy_outside_python_is_disarmed_by_the_first_signal_a
     assert len(resume(log, ScriptedDevice(), scripted_strategy(10)).run().trials) == 10
 
 
+@pytest.mark.slow
 def test_ctrl_z_disarms_before_it_suspends_and_a_continued_session_arms_for_nobody(log: Path) -> None:
     with victim(log, "time.sleep(600)") as process:
         process.send_signal(signal.SIGTSTP)

@@ -198,6 +198,7 @@ def test_a_session_that_wants_longer_isis_stops_all_the_same_when_its_budget_is_
     assert len(session.trials) == 5
 
 
+@pytest.mark.slow
 def test_where_all_isis_are_too_short_to_show_a_reflex_the_estimate_says_so(log: Path) -> None:
     session = of_a_reflex(0.3, 3, log.parent, NO_TAPS, DesignSpace(0, 60, reference="impact"), 20)
     estimate = session.strategy.estimate()

@@ -149,6 +149,7 @@ def late_trigger(stimulus: Stimulus) -> Sweep:
     return Sweep({"emg": Channel(emg_mv, 5000.0, "mV", t0_ms=-600.0)}, t_tms_ms=0.0, t_hit_ms=hit_ms)
 
 
+@pytest.mark.slow
 def test_an_mep_outside_its_window_pauses_the_session_once(log: Path) -> None:
     info = DeviceInfo("late", "impact", simulated=True, channels={"emg": "mV"})
     device = CallbackDevice(lambda stimulus, _: late_trigger(stimulus), info)

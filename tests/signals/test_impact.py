@@ -12,6 +12,7 @@ from signals.made import render
 PEOPLE = ("bench", "subject1", "subject2", "subject3", "subject4", "cushion")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PEOPLE)
 def test_the_impact_is_found_within_one_sample_in_99_of_100_sweeps(name: str) -> None:
     tapped = render(name, n=100, seed=10)

@@ -96,6 +96,7 @@ def test_taps_alone_say_what_of_an_amplitude_is_theirs() -> None:
     assert told.observation(Outcome(200.0, 0.3)).known_mv is None
 
 
+@pytest.mark.slow
 def test_a_tap_alone_uses_up_no_budget_and_what_was_told_before_it_is_learnt_again() -> None:
     taps = [(float(isi_ms), 0.3 if 10 <= isi_ms <= 50 else 0.01) for isi_ms in range(0, 90, 15)]
     pulses = [(isi_ms, 0.3 if 10 <= isi_ms <= 50 else 0.01) for isi_ms in ISIS_MS] * 2

@@ -9,6 +9,7 @@ from isiw.subjects import cohort
 PEOPLE = cohort("kim11", 5, 5)
 
 
+@pytest.mark.slow
 def test_a_course_has_a_profile_and_a_window_for_each_iteration() -> None:
     course = live("gpr", PEOPLE, 1, seed=5)
     assert course.iterations == len(course.told) - INITIAL + 1 == len(course.profiles_mv) == len(course.windows)
@@ -17,6 +18,7 @@ def test_a_course_has_a_profile_and_a_window_for_each_iteration() -> None:
     np.testing.assert_allclose(initial_ms, np.linspace(0, 500, INITIAL), atol=2.5)  # on the 5 ms grid
 
 
+@pytest.mark.slow
 def test_a_filter_has_one_spread_for_each_generation_and_its_last_particles() -> None:
     course = live("pf", PEOPLE, 1, seed=5)
     assert len(course.told) == GENERATION * len(course.spread)

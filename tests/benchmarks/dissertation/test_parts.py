@@ -54,6 +54,7 @@ def check(part: Told) -> None:
     assert all(place in PLACES or place == excitability.SECTION for place in part.pictures)
 
 
+@pytest.mark.slow
 def test_one_persons_traces_are_told() -> None:
     check(traces.tell(FEW, 5))
 

@@ -95,6 +95,7 @@ def test_not_significant_by_a_test_without_power_says_nothing() -> None:
     assert no_power(still) == ""
 
 
+@pytest.mark.slow
 def test_a_direction_that_is_smaller_than_its_errors_is_no_improvement() -> None:
     what = "The accelerometer improves SVMR: no more trials, and no lower F1."
     clear, vague = dissertations_own(), dissertations_own().assign(**{"SE": 20.0, "F1 SE": 0.2})
@@ -116,6 +117,7 @@ def test_the_texts_own_numbers_reproduce_every_claim_about_its_methods() -> None
     assert not broken
 
 
+@pytest.mark.slow
 def test_an_order_that_is_turned_round_fails_and_a_reading_brings_it_back() -> None:
     worse = changed("PF", "F1: measured", 0.9)
     what = "The methods' order by F1, without accelerometer."

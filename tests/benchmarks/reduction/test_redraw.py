@@ -15,6 +15,7 @@ def figures() -> dict[str, Figure]:
     return redrawn()
 
 
+@pytest.mark.slow
 def test_no_legend_stands_over_a_panel(figures: dict[str, Figure]) -> None:
     assert set(figures) == {
         "headline_by_trial",

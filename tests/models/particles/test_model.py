@@ -391,6 +391,7 @@ def test_isis_are_chosen_with_the_usual_more_probable_and_the_rest_is_believed_a
     assert np.exp(asking.swarm.log_weights).sum() == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_window_that_trials_show_to_be_late_is_asked_about_all_the_same() -> None:
     trials = [(isi_ms, 0.3 if 300 <= isi_ms <= 400 else 0.008) for isi_ms in range(0, 500, 25)]
     away_ms = []

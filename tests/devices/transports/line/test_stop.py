@@ -84,6 +84,7 @@ def arm_only(device: isiw.LineDevice, peer: PulsePeer) -> None:
     assert peer.armed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lie", NOT_POSITIVE)
 def test_stop_disarms_over_a_fresh_connection_where_the_first_answer_is_not_positive(
     device: isiw.LineDevice, peer: PulsePeer, lie: Lie

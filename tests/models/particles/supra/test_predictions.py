@@ -88,6 +88,7 @@ def test_predicted_outcomes_are_smallest_in_the_depression(subjects: list[Simula
     assert low < rest < high
 
 
+@pytest.mark.slow
 def test_meps_drawn_by_the_likelihood_are_depressed(subjects: list[SimulatedSubject]) -> None:
     profile = instance(OpposedProfile, subjects[0].profile)
     inside_ms = profile.depressed.start_ms + 0.5 * profile.depressed.width_ms
