@@ -106,7 +106,7 @@ def test_a_header_says_what_its_log_is_of_and_one_of_a_threshold_has_no_isis(tmp
 
 def test_another_prior_has_another_belief_version() -> None:
     digest = hashlib.sha256(repr(Prior()).encode()).hexdigest()[:16]
-    assert {ESTIMATE_VERSION: digest} == {7: "838bc06b089158cd"}  # of a new prior: the next number, and its digest
+    assert {ESTIMATE_VERSION: digest} == {8: "838bc06b089158cd"}  # of a new prior: the next number, and its digest
 
 
 def test_an_option_that_a_session_does_not_have_is_refused(tmp_path: Path) -> None:

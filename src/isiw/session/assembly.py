@@ -42,7 +42,7 @@ from isiw.strategy.decisions import stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.visit import Visit, VisitProtocol
 
-ESTIMATE_VERSION: Final = 7
+ESTIMATE_VERSION: Final = 8
 ENGINE_VERSION: Final = 4
 """Which prior a session learns by, and which engine computes it, for its header."""
 

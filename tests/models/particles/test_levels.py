@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from isiw.design import VALVE_SPACE
 from isiw.models.particles.changes import Change
-from isiw.models.particles.levels import drawn, levels_of
+from isiw.models.particles.levels import Level, drawn, foretold, levels_of
 from isiw.models.particles.model import ParticleModel, ParticlePosterior
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.protocol import Observation
@@ -113,6 +114,31 @@ def test_pulses_that_make_no_law_leave_the_curve_that_they_taught() -> None:
     learnt = pair(posterior_after(EVERY_10 * 2), 300.0, 0.1)
     assert learnt.trials == learnt.swarm.trials == 11
     assert (learnt.swarm.latents.noise != NoiseKind.BY_LEVELS).all()
+
+
+@pytest.mark.parametrize("jagged", [False, True])
+def test_levels_are_a_law_where_they_foretell_the_pulses_better_than_curves(*, jagged: bool) -> None:
+    rng, model = np.random.default_rng(4), ParticleModel(particles=400)
+    posterior = model.begin(VALVE_SPACE, 3)
+    for number, shift in enumerate([*EVERY_10, 50.0] * 8):
+        drive = 0.25 * (shift - 25.0 + 6.0 * rng.standard_normal())
+        log_mep = np.log(0.01 + 1.5 / (1.0 + np.exp(-drive))) + 0.3 * rng.standard_normal()
+        log_mep += (0.8 if number % 2 else -0.8) * jagged  # every second level is higher than a curve has it
+        posterior = posterior.after(Observation.of([None], [float(np.exp(log_mep))], shift_pct_rmt=[shift]))
+    learnt = pair(posterior, 300.0, 0.1)
+    assert (learnt.swarm.latents.noise == NoiseKind.BY_LEVELS).any() == jagged
+    assert learnt.swarm.trials == (2 if jagged else 49)
+
+
+def test_a_pulse_is_foretold_by_the_others_of_its_level() -> None:
+    log_mep = np.array([-1.0, -0.4, -0.7, 0.2])
+    levels = [Level(np.zeros(4), log_mep), Level(np.ones(4), log_mep + 3.0)]
+    by_hand = 0.0
+    for at in range(4):
+        others = np.delete(log_mep, at)
+        scale = np.sqrt((2.0 * 0.3**2 + ((others - others.mean()) ** 2).sum()) / 5.0 * (1.0 + 1.0 / 3.0))
+        by_hand += float(stats.t.logpdf(log_mep[at], 5.0, others.mean(), scale))
+    assert foretold(levels) == pytest.approx(2.0 * by_hand)
 
 
 def test_tms_alone_without_an_intensity_is_learnt_again_after_the_levels() -> None:

@@ -8,6 +8,7 @@ input, and its means lie .3 (log) off the best logistic curve (decision 60).
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -97,6 +98,20 @@ def _not_apart(levels: list[Level]) -> int | None:
     few = np.minimum(counts[:-1], counts[1:]) < LEAST_PULSES
     wanted = np.where(few & (apart <= MOST_APART_PCT_RMT), apart, np.inf)
     return int(wanted.argmin()) if np.isfinite(wanted).any() else None
+
+
+def foretold(levels: list[Level]) -> float:
+    """Log density of the pulses of levels, each as the others of its level foretell it, summed [nat]."""
+    found = 0.0
+    for _, log_mep in levels:
+        count = len(log_mep) - 1
+        others = np.array([np.delete(log_mep, at) for at in range(count + 1)])
+        degrees = AS_MANY + count
+        variance = (AS_MANY * USUAL_SD**2 + count * others.var(1)) / degrees * (1.0 + 1.0 / count)
+        at = (log_mep - others.mean(1)) ** 2 / variance  # of Student's t, which mean and variance come to
+        constant = math.lgamma(0.5 * (degrees + 1.0)) - math.lgamma(0.5 * degrees) - 0.5 * math.log(math.pi * degrees)
+        found += float((constant - 0.5 * np.log(variance) - 0.5 * (degrees + 1.0) * np.log1p(at / degrees)).sum())
+    return found
 
 
 def drawn(levels: list[Level], particles: int, rng: np.random.Generator) -> Singles:

@@ -16,7 +16,7 @@ import numpy as np
 from isiw.checks import Checked, Natural, Share
 from isiw.models.particles.compiled import Crowd, Law
 from isiw.models.particles.latents import Latents, latents_of
-from isiw.models.particles.levels import CARRIED, along_curves, drawn, levels_of
+from isiw.models.particles.levels import CARRIED, Level, along_curves, drawn, foretold, levels_of
 from isiw.models.particles.misfit import Bets
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import NoiseKind, recruits
@@ -176,8 +176,9 @@ class Swarm:
     def by_levels(self, learnt_law: Law, law: Law, seed: int, share: float) -> Swarm | None:
         """Particles that begin again with what pulses given alone have taught, in place of these pulses.
 
-        Half of them have a law by levels, every second one of these by those of the pulses, the others by those along
-        the curves that the pulses have taught; the other half is what it is with nothing given (decision 60).
+        That is where levels foretell the pulses better than the curves do that they have taught (decision 62). Half of
+        the particles then have a law by levels, every second one of these by those of the pulses, the others by those
+        along such curves; the other half is what it is with nothing given (decision 60).
 
         Args:
             learnt_law: what particles mean so far.
@@ -186,12 +187,15 @@ class Swarm:
             share: probability that the pairs are of another curve.
 
         Returns:
-            None where the pulses of any of the people make no law by levels.
+            None where the pulses of any of the people make no law by levels, or a curve foretells them better.
         """
         rows, people = self._rows, len(self.evidence)
         levels = [levels_of(self.history, self.halves * person) for person in range(people)]
         curved = np.where(recruits(rows.kinds[..., 1]), rows.log_weights, -np.inf)
         if not all(levels) or np.isneginf(curved[:: self.halves].max(1)).any():
+            return None
+        by_curves = [self._foretold_by_curves(learnt_law, rows, *one) for one in enumerate(levels)]
+        if any(found >= foretold(own) for found, own in zip(by_curves, levels, strict=True)):
             return None
         half = curved.shape[1]
         begun = Swarm.of(law, people, half, seed).doubting(share)
@@ -207,6 +211,22 @@ class Swarm:
             kinds[:, 1] = NoiseKind.BY_LEVELS
         given = History(self.history.columns[:, self._are_given])
         return replace(begun, crowd=crowd, evidence=self.evidence, bets=self.bets, given=given)
+
+    def _foretold_by_curves(self, law: Law, rows: Crowd, person: int, levels: list[Level]) -> float:
+        """Log density of the pulses of levels, each as curves foretell it that the others have taught, summed [nat].
+
+        The curves have learnt that pulse, too, as a part of a trial, which is taken back by weights [Vehtari2017].
+        """
+        row, at = self.halves * person, np.concatenate([own.shifts_pct_rmt for own in levels])
+        pulses = self.history.columns[row, self._are_given]
+        pulses = pulses[np.isin(pulses[:, SHIFT], at)]
+        pulses[:, [COUNTS, BY_CURVES]] = 1.0, 0.0
+        curved = recruits(rows.kinds[row, :, 1])
+        fields = law.meanings(rows.values[row : row + 1], rows.kinds[row : row + 1], -1)
+        likely = log_likelihoods(fields.repeat(len(pulses), axis=0), pulses[:, np.newaxis])[:, curved]
+        weights = rows.log_weights[row, curved]
+        found = log_sum(weights + (1.0 - OF_GIVEN) * likely) - log_sum(weights - OF_GIVEN * likely)
+        return float(found.sum())
 
     @property
     def _are_given(self) -> BoolArray:
