@@ -223,7 +223,7 @@ class Swarm:
         pulses[:, [COUNTS, BY_CURVES]] = 1.0, 0.0
         curved = recruits(rows.kinds[row, :, 1])
         fields = law.meanings(rows.values[row : row + 1], rows.kinds[row : row + 1], -1)
-        likely = log_likelihoods(fields.repeat(len(pulses), axis=0), pulses[:, np.newaxis])[:, curved]
+        likely = np.array([log_likelihoods(fields, pulse[np.newaxis, np.newaxis])[0, curved] for pulse in pulses])
         weights = rows.log_weights[row, curved]
         found = log_sum(weights + (1.0 - OF_GIVEN) * likely) - log_sum(weights - OF_GIVEN * likely)
         return float(found.sum())
