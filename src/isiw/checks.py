@@ -135,7 +135,7 @@ def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
 
 def mean_and_sd(what: str, value: object) -> tuple[float, float]:
     """The mean and the SD of a delay, both positive [ms]."""
-    pair = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
+    pair = _listed(value) or ()
     if len(pair) != 2:
         raise InvalidValueError(
             f"{what} must be a mean and an SD [ms]", got=value, remedy="Give both, such as (183.1, 6.0)."
@@ -173,9 +173,23 @@ def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
     return value
 
 
-def ascending(what: str, values: Iterable[object], **bounds: Unpack[Bounds]) -> tuple[float, ...]:
+def _listed(values: Any) -> tuple[Any, ...] | None:
+    """What a list holds; None of a text, and of a number or an array without a dimension, which cannot be iterated."""
+    with suppress(TypeError):
+        return None if isinstance(values, str) else tuple(values)
+    return None
+
+
+def numbers(what: str, values: object, **bounds: Unpack[Bounds]) -> tuple[float, ...]:
+    """A list of numbers."""
+    if (listed := _listed(values)) is None:
+        raise InvalidValueError(f"{what} must be a list of numbers", got=values)
+    return tuple(number(what, value, **bounds) for value in listed)
+
+
+def ascending(what: str, values: object, **bounds: Unpack[Bounds]) -> tuple[float, ...]:
     """Numbers of which each is larger than the one before."""
-    plain = tuple(number(what, value, **bounds) for value in values)
+    plain = numbers(what, values, **bounds)
     if any(later <= earlier for earlier, later in itertools.pairwise(plain)):
         raise InvalidValueError(f"{what} must ascend", got=plain)
     return plain
@@ -206,6 +220,7 @@ def function(what: str, value: object) -> Callable[..., Any]:
 
 Number: TypeAlias = Annotated[float, number]
 Patience: TypeAlias = Annotated[float, patience]
+Numbers: TypeAlias = Annotated[tuple[float, ...], numbers]
 Positive: TypeAlias = Annotated[float, partial(number, above=0)]
 NonNegative: TypeAlias = Annotated[float, partial(number, least=0)]
 Share: TypeAlias = Annotated[float, share]
