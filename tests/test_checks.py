@@ -28,7 +28,6 @@ from isiw.checks import (
     ascending,
     choice,
     deadline,
-    mean_and_sd,
     number,
     numbers,
     share,
@@ -124,7 +123,7 @@ def test_numbers_ascend() -> None:
 
 @pytest.mark.parametrize("value", [110, "110", np.array(110.0), None])
 def test_a_single_number_a_text_and_an_array_without_a_dimension_are_no_lists(value: Any) -> None:
-    for check in (numbers, ascending, mean_and_sd):
+    for check in (numbers, ascending):
         with pytest.raises(InvalidValueError, match="delays must be"):
             check("delays", value)
     assert numbers("delays", np.array([110.0, 90.0])) == (110.0, 90.0)

@@ -135,7 +135,7 @@ def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
 
 def mean_and_sd(what: str, value: object) -> tuple[float, float]:
     """The mean and the SD of a delay, both positive [ms]."""
-    pair = _listed(value) or ()
+    pair = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
     if len(pair) != 2:
         raise InvalidValueError(
             f"{what} must be a mean and an SD [ms]", got=value, remedy="Give both, such as (183.1, 6.0)."
@@ -173,18 +173,11 @@ def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
     return value
 
 
-def _listed(values: Any) -> tuple[Any, ...] | None:
-    """What a list holds; None of a text, and of a number or an array without a dimension, which cannot be iterated."""
-    with suppress(TypeError):
-        return None if isinstance(values, str) else tuple(values)
-    return None
-
-
-def numbers(what: str, values: object, **bounds: Unpack[Bounds]) -> tuple[float, ...]:
-    """A list of numbers."""
-    if (listed := _listed(values)) is None:
+def numbers(what: str, values: Any, **bounds: Unpack[Bounds]) -> tuple[float, ...]:
+    """A list of numbers; an array without a dimension says that it can be iterated, and is none."""
+    if not isinstance(values, Iterable) or isinstance(values, str) or getattr(values, "ndim", 1) == 0:
         raise InvalidValueError(f"{what} must be a list of numbers", got=values)
-    return tuple(number(what, value, **bounds) for value in listed)
+    return tuple(number(what, value, **bounds) for value in values)
 
 
 def ascending(what: str, values: object, **bounds: Unpack[Bounds]) -> tuple[float, ...]:
@@ -207,15 +200,6 @@ def flag(what: str, value: object) -> bool:
         remedy = "Write it without quotes: in a configuration true or false."
         raise InvalidValueError(f"{what} must be True or False", got=value, remedy=remedy)
     return bool(value)
-
-
-def function(what: str, value: object) -> Callable[..., Any]:
-    """Something that can be called."""
-    if not callable(value):
-        raise InvalidValueError(
-            f"{what} must be a function", got=value, remedy="Give the function, without calling it."
-        )
-    return value
 
 
 Number: TypeAlias = Annotated[float, number]
