@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -185,12 +186,15 @@ class Before(NamedTuple):
 def before_of(record: SessionRecord, already: Sequence[Trial]) -> Before:
     """What a session's strategy had learnt at its end, and what else was given, but for what is known already."""
     header, own = record.header, sorted((*record.table, *record.unknown_trials), key=lambda trial: trial.index)
-    known = bool(header.earlier) and all(trial in already for trial in header.earlier)
-    earlier = () if known else header.earlier
-    lost = [] if known else [Trial.unknown(Stimulus(0, None))] * (header.given_before - len(header.earlier))
-    noted, first = changed_after(record.events), len(lost) + len(earlier)
-    changed = {len(lost) + place for place in header.earlier_changed} if earlier else set()
-    if earlier and not header.earlier_same_level:
+    known = sum(1 for _ in itertools.takewhile(lambda trial: trial in already, header.earlier))
+    earlier, untold = header.earlier[known:], header.given_before - len(header.earlier)
+    if known:
+        untold = max(0, untold - sum(not trial.told for trial in already))
+    lost = [Trial.unknown(Stimulus(0, None))] * untold
+    noted, first = changed_after(record.events), untold + len(earlier)
+    # A place of -1 is that of the last trial that is known already.
+    changed = {untold + place - known for place in header.earlier_changed if place >= known - 1}
+    if header.earlier and not header.earlier_same_level:
         changed.add(first - 1)
     changed |= {first + place for place, trial in enumerate(own) if trial.index in noted}
     return Before((*lost, *earlier, *own), frozenset(changed))
