@@ -29,6 +29,7 @@ from isiw.checks import (
     choice,
     deadline,
     number,
+    numbers,
     share,
     whole,
 )
@@ -118,6 +119,14 @@ def test_numbers_ascend() -> None:
     for wrong in ((35, 15), (15, 15), (15, math.nan), (-1, 5)):
         with pytest.raises(InvalidValueError, match="window must"):
             ascending("window", wrong, least=0)
+
+
+@pytest.mark.parametrize("value", [110, "110", np.array(110.0), None])
+def test_a_single_number_a_text_and_an_array_without_a_dimension_are_no_lists(value: Any) -> None:
+    for check in (numbers, ascending):
+        with pytest.raises(InvalidValueError, match="delays must be"):
+            check("delays", value)
+    assert numbers("delays", np.array([110.0, 90.0])) == (110.0, 90.0)
 
 
 @dataclass(frozen=True)

@@ -273,7 +273,6 @@ def test_a_window_is_named_in_short_also_if_there_is_none() -> None:
     found = [SURE, NONE, Estimate(probability=0.3), not_reported, Estimate(probability=None), SWEPT]
     short = ["30–160 ms", "no window", "undecided", "window not reported", "no answer yet", "no window"]
     assert [summary.in_short(estimate) for estimate in found] == short
-    assert [summary.titled(estimate) for estimate in found[:2]] == ["Window 30–160 ms", "No window"]
 
 
 def test_a_trial_is_named_by_what_was_asked_and_what_came_of_it() -> None:

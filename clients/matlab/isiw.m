@@ -102,7 +102,10 @@ classdef isiw < handle
     end
 
     function alone(this, mep_mv, intensity_pct_rmt)
-      % TMS alone, as the trial lab.trials: the MEP [mV] of a pulse at an intensity [% RMT].
+      % TMS alone, as the trial lab.trials: the MEP [mV] of a pulse at an intensity [% RMT], by default that of the pairs.
+      if nargin < 3
+        intensity_pct_rmt = [];
+      end
       pairs = {'trial', number(this.trials), 'isi_ms', '', 'mep_mv', number(mep_mv), ...
                'intensity_pct_rmt', number(intensity_pct_rmt), 'client', this.key};
       this.conclude(this.post(this.path('tell'), pairs));

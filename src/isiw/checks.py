@@ -173,9 +173,16 @@ def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
     return value
 
 
-def ascending(what: str, values: Iterable[object], **bounds: Unpack[Bounds]) -> tuple[float, ...]:
+def numbers(what: str, values: Any, **bounds: Unpack[Bounds]) -> tuple[float, ...]:
+    """A list of numbers; an array without a dimension says that it can be iterated, and is none."""
+    if not isinstance(values, Iterable) or isinstance(values, str) or getattr(values, "ndim", 1) == 0:
+        raise InvalidValueError(f"{what} must be a list of numbers", got=values)
+    return tuple(number(what, value, **bounds) for value in values)
+
+
+def ascending(what: str, values: object, **bounds: Unpack[Bounds]) -> tuple[float, ...]:
     """Numbers of which each is larger than the one before."""
-    plain = tuple(number(what, value, **bounds) for value in values)
+    plain = numbers(what, values, **bounds)
     if any(later <= earlier for earlier, later in itertools.pairwise(plain)):
         raise InvalidValueError(f"{what} must ascend", got=plain)
     return plain
@@ -195,17 +202,9 @@ def flag(what: str, value: object) -> bool:
     return bool(value)
 
 
-def function(what: str, value: object) -> Callable[..., Any]:
-    """Something that can be called."""
-    if not callable(value):
-        raise InvalidValueError(
-            f"{what} must be a function", got=value, remedy="Give the function, without calling it."
-        )
-    return value
-
-
 Number: TypeAlias = Annotated[float, number]
 Patience: TypeAlias = Annotated[float, patience]
+Numbers: TypeAlias = Annotated[tuple[float, ...], numbers]
 Positive: TypeAlias = Annotated[float, partial(number, above=0)]
 NonNegative: TypeAlias = Annotated[float, partial(number, least=0)]
 Share: TypeAlias = Annotated[float, share]

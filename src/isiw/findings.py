@@ -173,12 +173,13 @@ INTERVAL_S: Final = UnitScale(most=1000.0, too_large=("ms", 1000))
 """More than anybody waits between two stimuli."""
 
 SHARE: Final = UnitScale(most=1.0, too_large=("%", 100))
-INTENSITY_PCT: Final = UnitScale(3.0, too_small=("parts of 1", 100))
-"""Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
+INTENSITY_PCT: Final = UnitScale(3.0, 300.0, ("parts of 1", 100), ("per mille", 10))
+"""Nobody stimulates with less, 1.2 is meant as 120 %; no stimulator reaches more where a threshold can be found."""
 
 
 def require_percent(what: str, intensity_pct: float | None) -> None:
     """Raise if an intensity [%] is probably in another unit; None is none."""
     if intensity_pct is not None:
         scale = INTENSITY_PCT
-        scale.require(f"{what} is probably in another unit", intensity_pct, f"at least {scale.least:g} %")
+        expected = f"{scale.least:g} to {scale.most:g} %"
+        scale.require(f"{what} is probably in another unit", intensity_pct, expected)

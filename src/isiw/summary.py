@@ -21,20 +21,16 @@ LEAST_FACTOR = 3.0
 
 JUDGED_SINCE: Final = "Trials were excluded or included after this estimate; isiw estimate LOG computes it again."
 
-
 ENOUGH_PAIRS: Final = 3
 """With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
-
 
 NO_MEP: Final = Finding(
     Kind.SILENT, Severity.NOTE, "No MEP was seen in any trial that counts, so nothing is known about a window"
 )
 
-
 TOO_FEW: Final = Finding(
     Kind.FEW_PAIRS, Severity.NOTE, "Fewer than three pairs of stimuli count so far, too few to speak of a window"
 )
-
 
 IN_DOUBT: Final = Finding(
     Kind.ISIS_FAR,
@@ -97,12 +93,6 @@ def in_short(estimate: Estimate) -> str:
     return "no window" if rules_out(estimate.probability) and not law_is_doubted(estimate) else "undecided"
 
 
-def titled(estimate: Estimate) -> str:
-    """The same for the head of a picture or a summary."""
-    window = f"{'Undecided, perhaps' if is_guess(estimate) else 'Window'} {estimate.window}"
-    return window if estimate.window else in_short(estimate).capitalize()
-
-
 def is_guess(estimate: Estimate) -> bool:
     """True if a window is reported that the trials hardly speak for, or by a law that they speak against."""
     factor = bayes_factor(estimate.probability, estimate.beforehand)
@@ -140,7 +130,18 @@ def summary(estimate: Estimate) -> str:
         lines.append(f"Depressed: {estimate.depressed or nothing} (probability of it: {depressed:.2f})")
     if estimate.change is not None and estimate.change.is_sure:
         lines.append(f"{at_a_trial(estimate.change, estimate.change.trial)}.")
-    return "\n".join((*lines, *filter(None, (tap_likely(estimate), tap_unmeasured(estimate)))))
+    return "\n".join((*lines, *filter(None, (misfit(estimate), tap_likely(estimate), tap_unmeasured(estimate)))))
+
+
+def misfit(estimate: Estimate) -> str:
+    """That amplitudes do not follow the law of responses, or that pulses given alone are of another level."""
+    if law_is_doubted(estimate):
+        wrong = "The MEPs vary otherwise than the law of responses expects, so that the window may be wrong."
+        return f"{wrong} Look at the sweeps: are there artefacts, or pulses without a response?"
+    if estimate.misfit is None or not estimate.misfit.of_curve:
+        return ""
+    fit = "The pulses given alone and the pairs do not fit each other: the window rests on the pairs."
+    return f"{fit} Are muscle, coil, gain and the scale of intensities the same?"
 
 
 def tap_likely(estimate: Estimate, first: StimulusWords = _EITHER) -> str:

@@ -58,6 +58,15 @@ def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice
     assert "another log already" in other.output
 
 
+@pytest.mark.usefixtures("read_here")
+def test_the_intensity_that_a_table_says_of_its_pairs_goes_to_the_strategy(isiw: Command, people: Path) -> None:
+    pd.read_csv(people).assign(intensity_pct_rmt=120).to_csv(people, index=False)
+    made = isiw("analyse", people, "--reference", "impact", "--config", "few.toml", "--only", "A", "-o", "A.mcap")
+    assert made.exit_code == 0, made.output
+    assert library.read_session("A.mcap").header.strategy.settings["intensity_pct_rmt"] == 120.0
+    assert "state the intensity" not in made.output
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("read_here")
 def test_what_reads_logs_reads_imported_ones_and_says_what_they_are(isiw: Command, people: Path) -> None:

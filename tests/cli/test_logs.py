@@ -43,6 +43,9 @@ def test_report_writes_a_page_beside_the_log_or_where_it_is_told(isiw: Command, 
     assert isiw("report", log).output.endswith(f"{log.stem}.html\n")
     assert "<title>Session of" in log.with_suffix(".html").read_text("utf-8")
     assert isiw("report", log).output.endswith(f"{log.stem}_2.html\n")
+    log.with_suffix(".html").write_text("old")
+    assert isiw("report", log, "--overwrite").output.endswith(f"{log.stem}.html\n")
+    assert "<title>Session of" in log.with_suffix(".html").read_text("utf-8")
     (tmp_path / "r.html").write_bytes(b"precious")
     refused = isiw("report", log, "-o", "r.html")
     assert refused.exit_code == 1

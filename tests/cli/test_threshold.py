@@ -120,7 +120,8 @@ def test_more_than_five_of_ten_is_an_option_that_its_log_keeps(tmp_path: Path) -
 def test_only_five_of_ten_counts_responses(tmp_path: Path) -> None:
     result = run(tmp_path / "t.mcap", "--enough", 6)
     assert result.exit_code == 1
-    assert "enough" in result.output
+    assert "an option is of --method five-of-ten alone; got '--enough'" in result.output
+    assert "of --method curve alone; got '--at, --each'" in run(tmp_path / "t.mcap", "--at", 60, "--each", 2).output
 
 
 @pytest.mark.slow

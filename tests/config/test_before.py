@@ -68,8 +68,7 @@ def test_pulses_before_the_search_count_for_what_follows_it(config: RunConfig, t
 def test_pulses_that_are_named_again_count_once(config: RunConfig, tmp_path: Path) -> None:
     both = config.with_overrides(earlier=[tmp_path / "curve.csv", tmp_path / "search.mcap"])
     alone = config.with_overrides(earlier=[tmp_path / "search.mcap"])
-    lengths = [len(known_before(each).trials) for each in (both, alone)]
-    assert lengths[0] == lengths[1]
+    assert known_before(both) == known_before(alone)
 
 
 def test_trials_that_a_later_session_had_learnt_count_once_whatever_the_order(
@@ -78,9 +77,11 @@ def test_trials_that_a_later_session_had_learnt_count_once_whatever_the_order(
     first, second = tmp_path / "search.mcap", tmp_path / "again.mcap"
     session_for(config.with_overrides(log=second, earlier=[first])).run(progress=False)
     own = sum(len(isiw.read_session(log).table) for log in (first, second))
-    for order in ([first, second], [second, first]):
-        both = config.with_overrides(earlier=order)
-        assert len(known_before(both).trials) == 30 + own
+    alone = known_before(config.with_overrides(earlier=[second]))
+    assert len(alone.trials) == 30 + own
+    assert len(alone.changed_after) == 2
+    for named in ([first, second], [second, first], [tmp_path / "curve.csv", second]):
+        assert known_before(config.with_overrides(earlier=named)) == alone
 
 
 def test_a_change_that_was_noted_in_the_search_is_known_afterwards_and_on_resuming(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from isiw.config.resume import Truth, run_of_log, truth_of
 from isiw.config.session import assumed_space, fresh_log_path
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
+from isiw.errors import ConfigError, DeviceError, InvalidValueError, IsiwError, StrategyError
 from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.threshold import open_threshold, resume_threshold
@@ -390,7 +390,13 @@ def test_a_search_of_another_muscle_or_person_is_refused_and_one_without_a_muscl
         ("intensity,mep\n110,0.4\n", "the columns intensity, mep"),
         ("intensity_pct_rmt,mep_mv\n110,much\n", "row 1 of .* is no pulse"),
         ("intensity_pct_rmt,mep_mv\n1.1,0.4\n", "row 1 of .* is no pulse"),
+        ("intensity_pct_rmt,mep_mv\n110,400\n", "row 1 of .* is no pulse.*in µV"),
+        ("intensity_pct_rmt,mep_mv\n110,0.0009\n", "less than EMG at rest has.*in V"),
+        ("intensity_pct_rmt,mep_mv\n110,0,4\n", "row 1 of .* more cells .*decimal sign"),
         ("intensity_pct_rmt,mep_mv\n", "no table of pulses"),
+        ("intensity_pct_rmt;mep_mv\n110;0.4\n", "with a comma between"),
+        ("intensity_pct_rmt,mep_mv,isi_ms\n110,0.4,80\n", "alone, .*leave out other rows and columns"),
+        ("intensity_pct_rmt,mep_mv,mep_mv\n110,0.4,80\n", "alone, .*leave out other rows and columns"),
     ],
 )
 def test_a_table_that_holds_no_pulses_is_refused_by_its_row(
@@ -398,8 +404,20 @@ def test_a_table_that_holds_no_pulses_is_refused_by_its_row(
 ) -> None:
     (tmp_path / "curve.csv").write_text(table)
     config = load_config(config_file(f'earlier = ["curve.csv"]\n{VISIT}'))
-    with pytest.raises(ConfigError, match=says):
+    with pytest.raises(IsiwError, match=says):
         session_for(config.with_overrides(log=tmp_path / "a.mcap"))
+
+
+def test_a_table_of_a_spreadsheet_has_spaces_and_empty_rows_and_is_no_workbook(
+    tmp_path: Path, config_file: WriteFile
+) -> None:
+    (tmp_path / "curve.csv").write_text("intensity_pct_rmt, mep_mv\n110, 0.4\n,\n\n")
+    config = load_config(config_file(f'earlier = ["curve.csv"]\n{VISIT}'))
+    assert [(trial.intensity_pct_rmt, trial.mep_mv) for trial in given_before(config).pulses] == [(110.0, 0.4)]
+    (tmp_path / "curve.xlsx").write_bytes(b"PK\xc7")
+    config = load_config(config_file(f'earlier = ["curve.xlsx"]\n{VISIT}'))
+    with pytest.raises(ConfigError, match=r"cannot be read.*Save it as CSV"):
+        given_before(config)
 
 
 def test_a_visit_with_pulses_over_the_curve_needs_the_log_of_all_of_them(

@@ -410,6 +410,8 @@ def test_amplitudes_that_the_law_does_not_expect_are_said_and_leave_it_undecided
 
 def test_pulses_alone_that_do_not_fit_the_pairs_are_said_and_the_window_stays(record: SessionRecord) -> None:
     estimate = {"probability": 0.99, "segments_ms": (30.0, 90.0), "misfit": Misfit(law=2.0, curve=60.0)}
-    statement = final_statement(with_estimate(record, **estimate))
+    found = with_estimate(record, **estimate)
+    statement = final_statement(found)
     assert "The pulses given alone and the pairs do not fit each other" in statement
     assert "undecided" not in statement
+    assert "The pulses given alone and the pairs do not fit each other" in summary(found.estimates[-1])

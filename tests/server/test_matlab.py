@@ -69,6 +69,7 @@ lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
 given = PULSES;
 lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr'), 'earlier', given));
 lab.alone(1.1, 120);
+lab.alone(0.1);
 lab.close();
 """
 
@@ -89,7 +90,7 @@ def test_pulses_over_the_curve_are_given_before_and_within_a_session(
     assert ran.returncode == 0, ran.stderr
     record = read_session(tmp_path / "sessions" / "P07.mcap")
     known = [(trial.mep_mv, trial.intensity_pct_rmt) for trial in (*record.header.earlier, *record.table)]
-    assert known == [*before, (1.1, 120.0)]
+    assert known == [*before, (1.1, 120.0), (0.1, None)]
 
 
 NO_NUMBER = """

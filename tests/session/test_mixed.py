@@ -231,11 +231,23 @@ def test_a_loop_of_ones_own_refuses_an_intensity_in_another_unit_and_logs_one_be
     ]
 
 
-def test_pulses_given_before_with_an_intensity_in_another_unit_are_refused(tmp_path: Path) -> None:
-    pulse = Trial.of(None, 0.5, intensity_pct_rmt=1.2)
-    with pytest.raises(InvalidValueError, match="in another unit"):
+@pytest.mark.parametrize(
+    ("mep_mv", "pct_rmt", "says"),
+    [(0.5, 1.2, "in another unit"), (400.0, 110.0, "Is it in µV"), (0.0009, 110.0, "Is it in V")],
+)
+def test_pulses_given_before_in_another_unit_are_refused(
+    tmp_path: Path, mep_mv: float, pct_rmt: float, says: str
+) -> None:
+    pulse = Trial.of(None, mep_mv, intensity_pct_rmt=pct_rmt)
+    with pytest.raises(InvalidValueError, match=says):
         isiw.open_session(mixed(), log=tmp_path / "own.mcap", earlier=[pulse], visit=Visit(intensity_pct_rmt=90.0))
     assert not (tmp_path / "own.mcap").exists()
+
+
+@pytest.mark.parametrize("named", [110, "110", ["90", "110"]])
+def test_named_intensities_are_a_list_of_numbers(named: object) -> None:
+    with pytest.raises(InvalidValueError, match=r"intensities_pct_rmt must be a (list of numbers|finite number)"):
+        isiw.make_strategy(space=SPACE, intensities_pct_rmt=named)
 
 
 def test_only_a_model_with_a_law_of_intensities_takes_pairs_of_several() -> None:

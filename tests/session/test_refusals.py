@@ -24,6 +24,7 @@ from scripted import ScriptedDevice, scripted_strategy
     [
         (Visit(intensity_pct_rmt=1.1), "the visit's intensity_pct_rmt is probably in another unit.*parts of 1"),
         (Visit(intensity_pct_mso=0.6), "the visit's intensity_pct_mso is probably in another unit.*parts of 1"),
+        (Visit(intensity_pct_rmt=1100), "the visit's intensity_pct_rmt is probably in another unit.*3 to 300 %"),
         (Visit(intensity_pct_rmt=110.0), r"different intensities .*got '80 % of RMT in the strategy'; expected 110"),
     ],
 )

@@ -188,8 +188,10 @@ def log_exists(source: str | Path) -> bool:
     return Path(closed).is_file() or Path(f"{closed}.part").is_file()
 
 
-def free_beside(log: Path, suffix: str) -> Path:
+def free_beside(log: Path, suffix: str, *, overwrite: bool = False) -> Path:
     """Where a file of a session goes that nobody gave a place: beside its log, under a name that is free."""
     stem = Path(log.name.removesuffix(".part")).stem
+    if overwrite:
+        return log.with_name(f"{stem}{suffix}")
     names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
     return next(path for path in (log.with_name(f"{name}{suffix}") for name in names) if not os.path.lexists(path))

@@ -83,7 +83,7 @@ def _save(
     """Save what is made of a log, beside it if nobody gave a place, and say where it is."""
     record = isiw.read_session(log)
     say_unread(record)
-    target = output or free_beside(record.path, suffix)
+    target = output or free_beside(record.path, suffix, overwrite=overwrite)
     with working(f"Drawing {record.path.name}"):
         truth = isiw.config.resume.truth_of(record)
         saved = save(record, target, truth=truth.window, overwrite=overwrite)

@@ -168,6 +168,9 @@ def _require_used(context: typer.Context, *, kept: bool, by_hand: bool) -> None:
     if by_hand:
         of_people = ("cohort",) if context.params["method"] == "curve" else ("cohort", "seed")
         refuse_ignored("nobody is simulated if a stimulator is set by hand", context, *of_people)
+    for method, its in {"five-of-ten": ("enough",), "curve": ("at", "each")}.items():
+        if not kept and context.params["method"] != method:
+            refuse_ignored(f"an option is of --method {method} alone", context, *its)
     if by_hand and not kept and not is_given(context, "high"):
         raise isiw.errors.ConfigError(
             "the highest intensity is missing", remedy="Say with --high how far you may go with this person."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -15,13 +16,17 @@ from isiw.log.reader import ThresholdRecord
 from isiw.log.record import SessionRecord, read_any, read_session
 from isiw.log.salvage import salvage
 from isiw.log.verdicts import changed_after
+from isiw.session.stated import require_given
 from isiw.session.threshold import search_of
+from isiw.signals.plausible import require_amplitude
 from isiw.strategy.threshold.curve import CurvePulses
 from isiw.text.sanitize import command, counted
 from isiw.trials import Status, Stimulus, Trial
 from isiw.visit import different_muscles
 
 _COLUMNS: Final = ("intensity_pct_rmt", "mep_mv")
+_TABLES: Final = frozenset({".csv", ".tsv", ".txt", ".xlsx", ".xls"})
+"""Of these CSV alone is read; the others are no logs either, and who names one is told so."""
 
 
 class Given(NamedTuple):
@@ -105,8 +110,8 @@ def _require_curve(config: RunConfig, searches: Sequence[ThresholdRecord]) -> No
 
 
 def is_table(path: Path) -> bool:
-    """True if a file is a table of pulses, and no log."""
-    return path.suffix.lower() == ".csv"
+    """True if a file is meant as a table of pulses, and as no log."""
+    return path.suffix.lower() in _TABLES
 
 
 def _pulses_of_table(path: Path) -> tuple[Trial, ...]:
@@ -114,24 +119,37 @@ def _pulses_of_table(path: Path) -> tuple[Trial, ...]:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             table = csv.DictReader(file)
-            rows, names = list(table), table.fieldnames or []
+            table.fieldnames = names = [name.strip() for name in table.fieldnames or []]
+            rows = [row for row in table if any(row.values())]  # a spreadsheet writes empty ones below the last
     except (OSError, ValueError, csv.Error) as error:
-        raise ConfigError("the table of pulses cannot be read", got=f"{path}: {error}") from error
-    if not {*_COLUMNS} <= {*names} or not rows:
+        remedy = "Save it as CSV, in UTF-8, with commas between the columns."
+        raise ConfigError("the table of pulses cannot be read", got=f"{path}: {error}", remedy=remedy) from error
+    # Another column may say that a row is a pair, of another muscle, or to be left out.
+    if sorted(names) != sorted(_COLUMNS) or not rows:
         raise ConfigError(
             "this is no table of pulses that were given before",
             got=f"the columns {', '.join(names) or 'none'} in {path}",
-            expected=f"the columns {' and '.join(_COLUMNS)}, and a row for each pulse",
-            remedy="Trials with ISIs become a log first: isiw analyse.",
+            expected=f"the columns {' and '.join(_COLUMNS)} alone, with a comma between, and a row for each pulse",
+            remedy="Keep pulses of TMS alone that count, of the visit's muscle, and leave out other rows and columns. "
+            "Trials with ISIs become a log first: isiw analyse.",
         )
-    return tuple(_pulse(path, number, row) for number, row in enumerate(rows))
+    pulses = tuple(_pulse(path, number, row) for number, row in enumerate(rows))
+    require_given(pulses)
+    return pulses
 
 
 def _pulse(path: Path, number: int, row: Mapping[str, str | None]) -> Trial:
+    if None in row:  # as csv calls the cells beyond the last column
+        raise ConfigError(
+            f"row {number + 1} of {path} has more cells than there are columns",
+            got=", ".join(f"{name} = {row[name]}" for name in _COLUMNS) + ", and more",
+            remedy="Is the decimal sign a comma? Write a point.",
+        )
     try:
         pct_rmt, mep_mv = (float(row[name] or "") for name in _COLUMNS)
         require_percent("the intensity", pct_rmt)
-        return Trial(number, Status.ACCEPTED, None, mep_mv=mep_mv, intensity_pct_rmt=pct_rmt)
+        pulse = Trial(number, Status.ACCEPTED, None, mep_mv=mep_mv, intensity_pct_rmt=pct_rmt)
+        require_amplitude(mep_mv)
     except ValueError as error:
         raise ConfigError(
             f"row {number + 1} of {path} is no pulse",
@@ -139,6 +157,7 @@ def _pulse(path: Path, number: int, row: Mapping[str, str | None]) -> Trial:
             expected="an intensity in % RMT and an amplitude in mV",
             remedy=f"Correct the row: {error}",
         ) from error
+    return pulse
 
 
 def _of_searches(config: RunConfig, searches: Sequence[ThresholdRecord]) -> str:
@@ -167,12 +186,15 @@ class Before(NamedTuple):
 def before_of(record: SessionRecord, already: Sequence[Trial]) -> Before:
     """What a session's strategy had learnt at its end, and what else was given, but for what is known already."""
     header, own = record.header, sorted((*record.table, *record.unknown_trials), key=lambda trial: trial.index)
-    known = bool(header.earlier) and all(trial in already for trial in header.earlier)
-    earlier = () if known else header.earlier
-    lost = [] if known else [Trial.unknown(Stimulus(0, None))] * (header.given_before - len(header.earlier))
-    noted, first = changed_after(record.events), len(lost) + len(earlier)
-    changed = {len(lost) + place for place in header.earlier_changed} if earlier else set()
-    if earlier and not header.earlier_same_level:
+    known = sum(1 for _ in itertools.takewhile(lambda trial: trial in already, header.earlier))
+    earlier, untold = header.earlier[known:], header.given_before - len(header.earlier)
+    if known:
+        untold = max(0, untold - sum(not trial.told for trial in already))
+    lost = [Trial.unknown(Stimulus(0, None))] * untold
+    noted, first = changed_after(record.events), untold + len(earlier)
+    # A place of -1 is that of the last trial that is known already.
+    changed = {untold + place - known for place in header.earlier_changed if place >= known - 1}
+    if header.earlier and not header.earlier_same_level:
         changed.add(first - 1)
     changed |= {first + place for place, trial in enumerate(own) if trial.index in noted}
     return Before((*lost, *earlier, *own), frozenset(changed))

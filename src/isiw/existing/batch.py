@@ -163,8 +163,7 @@ def analyse_person(person: Person, way: Way) -> Analysis:
     if person.refused is not None:
         raise person.refused
     delivered = person.delivered
-    over_the_curve = any(trial.intensity_pct_rmt is not None for trial in delivered.trials)
-    stated = {"intensity_pct_rmt": delivered.visit.intensity_pct_rmt if over_the_curve else None}
+    stated = {"intensity_pct_rmt": delivered.visit.intensity_pct_rmt}
     settings = isiw.strategy.catalogue.known_settings(way.strategy, stated) | dict(way.settings)
     strategy = isiw.strategy.make_strategy(way.strategy, way.space or delivered.space(), way.seed, **settings)
     analysis = isiw.existing.analysed(delivered, strategy, {ANALYSED_KEY: dict(person.made_of)})

@@ -35,7 +35,7 @@ from isiw.types import FloatArray
 if TYPE_CHECKING:
     from isiw.existing.quantities import Columns
 
-_INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
+_INTENSITY: Final = re.compile(r"intensit|stärke\b|\b(mso|r?mt|output|strength|power|[ab][ -]amplitude)\b")
 _NUMBER: Final = re.compile(r"[-.,]*\d[\d.,]*")
 _FEW, _BELOW = 3, 50  # so many rows at most are below the trials
 _SEVERAL: Final = 12  # in a table with fewer rows most may be left out

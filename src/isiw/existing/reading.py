@@ -36,7 +36,6 @@ from isiw.trials import Status, Stimulus, Trial
 from isiw.types import Reference
 from isiw.visit import Visit
 
-_STRONGEST_PCT_RMT: Final = 300.0  # no stimulator reaches more in a person whose threshold can be found [% RMT]
 _ALWAYS: Final = "reference units longest_isi_ms"
 _OF_ROWS, _OF_SAMPLES = "columns where alone decimal", "channels markers rate_hz mep_window_ms"
 """What of a layout is used of any file, of rows that say ISIs, and of samples."""
@@ -261,7 +260,7 @@ def _with_intensities(trials: Sequence[Trial], columns: Columns) -> tuple[list[T
     name, own, paired = columns["intensity"].name, list[Trial](), dict[float | None, str]()
     stated = [columns["intensity"].number(row) for row in columns.rows]
     for row, pct_rmt, trial in zip(columns.rows, stated, trials, strict=True):
-        if pct_rmt is not None and not INTENSITY_PCT.least <= pct_rmt <= _STRONGEST_PCT_RMT:
+        if pct_rmt is not None and not INTENSITY_PCT.least <= pct_rmt <= INTENSITY_PCT.most:
             remedy = "It must be in % of the resting motor threshold."
             raise columns.of["intensity"].refused(row, "is no intensity in % RMT", remedy)
         if trial.wanted_isi_ms is not None:

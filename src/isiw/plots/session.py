@@ -29,7 +29,7 @@ from isiw.plots.style import (
     session_name,
     tidied,
 )
-from isiw.summary import titled
+from isiw.summary import in_short, is_guess
 from isiw.text.sanitize import counted
 from isiw.trials import Trial
 from isiw.types import FloatArray
@@ -206,7 +206,10 @@ def _found(record: SessionRecord) -> str:
         return "No MEP was seen"
     if not record.rests_on_data:
         return f"Too little was measured: {counted(record.pairs, 'pair counts', 'pairs count')}"
-    return "No estimate" if record.found is None else titled(record.found)
+    if (found := record.found) is None:
+        return "No estimate"
+    window = f"{'Undecided, perhaps' if is_guess(found) else 'Window'} {found.window}"
+    return window if found.window else in_short(found).capitalize()
 
 
 def _draw_edges(axes: Axes, record: SessionRecord, truth: Window | None) -> None:

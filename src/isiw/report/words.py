@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from isiw import schedule, sentences, summary
-from isiw.change import Misfit
 from isiw.decision import OF_THE_WINDOW, StopKind
 from isiw.errors import InvalidValueError
 from isiw.figures import Estimate
@@ -187,7 +186,7 @@ def answer_and_warnings(estimate: Estimate, header: Header, told: Sequence[Trial
     expected = (estimate.grid_ms, estimate.profile_mv) if estimate.profile_mv else None
     against = {
         "tap": summary.tap_likely(estimate, first),
-        "misfit": _misfit(estimate.misfit),
+        "misfit": summary.misfit(estimate),
         "contradiction": contradiction(window, told, without_probability=estimate.probability is None),
         "few outside": no_comparison(window, told),
         "changed with time": changed_with_time(window, told, expected),
@@ -205,17 +204,6 @@ def _best_isi(estimate: Estimate) -> str:
     (size, low, high), (ratio, least, most) = estimate.enhancement_mv, estimate.enhancement_ratio
     larger = f"{size:.2g} mV ({low:.2g}–{high:.2g}) above TMS alone, {ratio:.2g} times it ({least:.2g}–{most:.2g})"
     return f"{said.removesuffix('.')}, {larger}."
-
-
-def _misfit(found: Misfit | None) -> str:
-    """That amplitudes do not follow the law of responses, or that pulses given alone are of another level."""
-    if found is not None and found.of_law:
-        wrong = "The MEPs vary otherwise than the law of responses expects, so that the window may be wrong."
-        return f"{wrong} Look at the sweeps: are there artefacts, or pulses without a response?"
-    if found is not None and found.of_curve:
-        fit = "The pulses given alone and the pairs do not fit each other: the window rests on the pairs."
-        return f"{fit} Are muscle, coil, gain and the scale of intensities the same?"
-    return ""
 
 
 def _depression(record: SessionRecord) -> str:

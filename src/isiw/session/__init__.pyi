@@ -4,6 +4,7 @@ from .afterwards import open_arm as open_arm
 from .console import PROGRESS_HEADINGS as PROGRESS_HEADINGS
 from .console import aligned as aligned
 from .console import progress_row as progress_row
+from .given import given_pulses as given_pulses
 from .loop import Session as Session
 from .recorder import Recorder as Recorder
 from .resume import open_session as open_session

@@ -14,7 +14,6 @@ from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device, HasMemory, info_of
 from isiw.errors import InvalidValueError, LogError
-from isiw.findings import require_percent
 from isiw.log.continuing import OWN_LOOP, continued_by, require_session
 from isiw.log.headers import Header
 from isiw.log.kinds import LogKind, of_another_kind
@@ -37,7 +36,7 @@ from isiw.session.intensities import stimulus_of
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder
 from isiw.session.replay import require_as_real, require_same_person, taken_up
-from isiw.session.stated import require_limits, require_protocol, require_visit
+from isiw.session.stated import require_given, require_limits, require_protocol, require_visit
 from isiw.session.threshold import ThresholdRecorder, resume_threshold
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.outcomes import require_trials
@@ -75,7 +74,7 @@ def open_session(
         InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text,
             or another than the log's; a protocol with control trials; a rest or a period that limits nothing, a limit
             on intensity or coil temperature, which are unknown here, limits that do not hold the strategy's plan, or
-            an intensity of earlier trials that is in another unit.
+            intensities or amplitudes of earlier trials that are in another unit.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
 
@@ -86,8 +85,7 @@ def open_session(
     path = require_parts(log, options, strategy=(strategy, Strategy))
     require_new(strategy)
     if trials := require_trials(earlier):
-        for trial in trials:
-            require_percent("the intensity of a trial that was given before", trial.intensity_pct_rmt)
+        require_given(trials)
         strategy.learn_all(trials)
     stated = _stated(strategy.space, options)
     if resume and log_exists(path):

@@ -15,14 +15,14 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Annotated, Final, Never
 
-from isiw.checks import Checked, NonNegative, choice, function, whole
+from isiw.checks import Checked, NonNegative, choice, whole
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import Deadlines, PunctualDevice
 from isiw.devices.info import DeviceInfo
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device
-from isiw.errors import DeviceError, StillArmedError, error_text, os_errors
+from isiw.errors import DeviceError, InvalidValueError, StillArmedError, error_text, os_errors
 from isiw.files import shared_file
 from isiw.log.durable import claim
 from isiw.log.schema import Event, waveform_topic
@@ -82,6 +82,15 @@ def _taken(which: str) -> DeviceError:
     )
 
 
+def _function(what: str, value: object) -> object:
+    """Something that can be called."""
+    if not callable(value):
+        raise InvalidValueError(
+            f"{what} must be a function", got=value, remedy="Give the function, without calling it."
+        )
+    return value
+
+
 @dataclass(frozen=True)
 class Safeguards(Checked):
     """The means by which a session keeps a person safe besides its limits.
@@ -103,8 +112,8 @@ class Safeguards(Checked):
     deadlines: Deadlines = field(default_factory=Deadlines)
     retries: Annotated[int, partial(whole, least=0, most=10)] = 3
     backoff_s: NonNegative = 1.0
-    on_pause: Annotated[Callable[[str], bool], function] | None = None
-    dead_man: Annotated[Callable[[], bool], function] | None = None
+    on_pause: Annotated[Callable[[str], bool], _function] | None = None
+    dead_man: Annotated[Callable[[], bool], _function] | None = None
     earlier_logs: str | Path | None = None
 
     @property

@@ -6,12 +6,15 @@ What earlier logs state is not checked by these, so that it stays readable.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from isiw.devices.limits import PulseLimits
 from isiw.errors import InvalidValueError
-from isiw.findings import require_percent
+from isiw.findings import refused, require_percent
 from isiw.signals.limits import ARTEFACT_MS, SignalLimits
+from isiw.signals.plausible import implausible_scale, require_amplitude
 from isiw.signals.spans import MEP_WINDOW_MS
+from isiw.trials import Trial
 from isiw.visit import Visit, VisitProtocol, interval_s
 
 MOST_COIL_C = 60.0
@@ -47,6 +50,18 @@ def require_limits(limits: PulseLimits) -> None:
             expected=f"period_s above {limits.max_period_pulses * limits.iti_s:g}",
             remedy="Set a longer period_s [s] or fewer max_period_pulses, or leave out both.",
         )
+
+
+def require_given(trials: Iterable[Trial]) -> None:
+    """Raise if intensities or amplitudes of trials that were given before are probably in another unit."""
+    meps_mv = []
+    for trial in trials:
+        require_percent("the intensity of a trial that was given before", trial.intensity_pct_rmt)
+        if trial.told and trial.mep_mv is not None:
+            require_amplitude(trial.mep_mv)
+            meps_mv.append(trial.mep_mv)
+    if (found := implausible_scale(meps_mv)) is not None:
+        raise refused(found, max(meps_mv))
 
 
 def require_protocol(protocol: VisitProtocol, min_iti_s: float) -> None:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, Final, TypeAlias, get_args
+from typing import Annotated, Final, get_args
 
 import numpy as np
 
-from isiw.checks import Checked, Flag, MeanAndSd, NonNegative, Number, Positive, Share, choice, number, whole
+from isiw.checks import Checked, Flag, MeanAndSd, NonNegative, Number, Numbers, Positive, Share, choice, number, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.excess import EDGE_LEVEL, LEAST_DEPRESSED_MV, window_from_excess
@@ -19,8 +19,6 @@ from isiw.subjects.changes import Change, Plasticity, TapResponse, amplitude_of_
 from isiw.subjects.responses import OpposedProfile, Profile, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.types import Conditioning, FloatArray, Reference
 from isiw.window import Window
-
-_Numbers: TypeAlias = Annotated[tuple[float, ...], lambda what, given: tuple(number(what, each) for each in given)]
 
 OUTLIERS_MV: Final = (0.1, 0.5)
 """Between these an artefact's amplitude is uniform [mV]."""
@@ -38,7 +36,7 @@ class Drift(Checked):
 
     persistence: Annotated[float, partial(number, least=-1, most=1)] = 0.97
     innovation_sd: NonNegative = 0.12
-    startup: _Numbers = (0.29, 0.20)
+    startup: Numbers = (0.29, 0.20)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import ACQUISITIONS, acquisition_named
-from isiw.checks import MOST_OF_A_KIND, Checked, Count, Flag, Natural, Positive, Share, choice, share, whole
+from isiw.checks import MOST_OF_A_KIND, Checked, Count, Flag, Natural, Numbers, Positive, Share, choice, share, whole
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, StrategyError, did_you_mean
 from isiw.models.protocol import ResponseModel
@@ -84,7 +84,7 @@ class Choosing(Checked):
 
     acquisition: AcquisitionName = "alternating"
     initial_trials: Natural = 0
-    intensities_pct_rmt: tuple[float, ...] = ()
+    intensities_pct_rmt: Numbers = ()
     chooses_intensity: Flag = False
 
     def function(self, seed: int) -> AcquisitionFunction:

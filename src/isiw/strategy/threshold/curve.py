@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from functools import partial
+from typing import Annotated, Final
 
 import numpy as np
 
-from isiw.checks import Checked, Count, Natural, Positive
+from isiw.checks import Checked, Count, Natural, numbers
 from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.strategy.threshold.bayes import BayesThreshold
@@ -32,7 +33,7 @@ class NamedPulses(Checked):
         InvalidValueError: no intensity, or one that is named twice.
     """
 
-    at_pct_mso: tuple[Positive, ...] = ()
+    at_pct_mso: Annotated[tuple[float, ...], partial(numbers, above=0)] = ()
     each: Count = 5
 
     def __post_init__(self) -> None:
