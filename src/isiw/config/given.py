@@ -25,6 +25,9 @@ from isiw.trials import Status, Stimulus, Trial
 from isiw.visit import different_muscles
 
 _COLUMNS: Final = ("intensity_pct_rmt", "mep_mv")
+_COUNTING: Final = frozenset({"pulse", "number", "no", "nr", "index", "trial", "time", "time_s", "date"})
+"""Columns that number or date pulses, and say nothing else of them."""
+
 _TABLES: Final = frozenset({".csv", ".tsv", ".txt", ".xlsx", ".xls"})
 """Of these CSV alone is read; the others are no logs either, and who names one is told so."""
 
@@ -125,11 +128,12 @@ def _pulses_of_table(path: Path) -> tuple[Trial, ...]:
         remedy = "Save it as CSV, in UTF-8, with commas between the columns."
         raise ConfigError("the table of pulses cannot be read", got=f"{path}: {error}", remedy=remedy) from error
     # Another column may say that a row is a pair, of another muscle, or to be left out.
-    if sorted(names) != sorted(_COLUMNS) or not rows:
+    if sorted(name for name in names if name.casefold() not in _COUNTING) != sorted(_COLUMNS) or not rows:
         raise ConfigError(
             "this is no table of pulses that were given before",
             got=f"the columns {', '.join(names) or 'none'} in {path}",
-            expected=f"the columns {' and '.join(_COLUMNS)} alone, with a comma between, and a row for each pulse",
+            expected=f"the columns {' and '.join(_COLUMNS)}, perhaps pulse or time_s, with a comma between, and a row for "
+            "each pulse",
             remedy="Keep pulses of TMS alone that count, of the visit's muscle, and leave out other rows and columns. "
             "Trials with ISIs become a log first: isiw analyse.",
         )
