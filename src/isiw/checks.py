@@ -177,7 +177,7 @@ def numbers(what: str, values: Any, **bounds: Unpack[Bounds]) -> tuple[float, ..
     """A list of numbers; an array without a dimension says that it can be iterated, and is none."""
     if not isinstance(values, Iterable) or isinstance(values, str) or getattr(values, "ndim", 1) == 0:
         raise InvalidValueError(f"{what} must be a list of numbers", got=values)
-    return tuple(number(what, value, **bounds) for value in values)
+    return tuple(number(f"each of {what}", value, **bounds) for value in values)
 
 
 def ascending(what: str, values: object, **bounds: Unpack[Bounds]) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from isiw.checks import Checked, NonNegative, Number, Positive, number
+from isiw.checks import Checked, NonNegative, Number, Positive, number, numbers
 from isiw.errors import InvalidValueError, OutOfSpaceError
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray, Reference
@@ -187,7 +187,7 @@ class DesignSpace(Checked):
 
 def range_of(isis_ms: Iterable[float]) -> dict[str, Any]:
     """The fields of a design space that a list of ISIs [ms] stands for."""
-    listed = tuple(sorted({number("an ISI of the design space [ms]", isi_ms) for isi_ms in isis_ms}))
+    listed = tuple(sorted({*numbers("the ISIs of the design space [ms]", isis_ms)}))
     if len(listed) < 2:
         raise InvalidValueError("a list of ISIs needs at least two", got=listed)
     return {"low_ms": listed[0], "high_ms": listed[-1], "step_ms": _widest_ms(listed), "isis_ms": listed}

@@ -132,8 +132,8 @@ def _pulses_of_table(path: Path) -> tuple[Trial, ...]:
         raise ConfigError(
             "this is no table of pulses that were given before",
             got=f"the columns {', '.join(names) or 'none'} in {path}",
-            expected=f"the columns {' and '.join(_COLUMNS)}, perhaps pulse or time_s, with a comma between, and a row for "
-            "each pulse",
+            expected=f"the columns {' and '.join(_COLUMNS)}, perhaps pulse or time_s, with a comma between, and a row "
+            "for each pulse",
             remedy="Keep pulses of TMS alone that count, of the visit's muscle, and leave out other rows and columns. "
             "Trials with ISIs become a log first: isiw analyse.",
         )

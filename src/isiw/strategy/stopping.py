@@ -54,7 +54,7 @@ class Budget(Checked):
         """Decide whether to stop."""
         left = self.max_trials - progress.delivered
         if left <= 0:
-            return StopKind.BUDGET.stop(f"The budget of {self.max_trials} stimuli is used up.")
+            return StopKind.BUDGET.stop(f"The budget of {counted(self.max_trials, 'stimulus', 'stimuli')} is used up.")
         return StopKind.BUDGET.go_on(f"{counted(left, 'stimulus is left', 'stimuli are left')}.")
 
 
