@@ -8,7 +8,7 @@ import statistics
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, groupby, pairwise
+from itertools import groupby, pairwise
 from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
@@ -22,6 +22,7 @@ from isiw.existing.names import (
     ALL,
     MEANS,
     TITLES_OF_MEANS,
+    is_mishap,
     is_verdict,
     key_of_flags,
     require_title,
@@ -37,12 +38,15 @@ if TYPE_CHECKING:
 
 _INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
 _NUMBER: Final = re.compile(r"[-.,]*\d[\d.,]*")
-_FEW, _BELOW = 3, 50  # so many rows at most are below the trials
+_FEW, _BELOW_AT_MOST, _BELOW = 3, 9, 50  # so many rows at most are below the trials
 _SEVERAL: Final = 12  # in a table with fewer rows most may be left out
 _CODE: Final = 4  # a shorter text in rows that follow may be initials
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
 _ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
+_USUAL: Final = 8  # figures are what stands below trials in most files, the first half of these in nearly all
+_CHANCE: Final = 0.02  # with which single trials are hardly by chance what they seem
+_NO_REMARKS: Final = WORDS["alone"] | WORDS["tap alone"] | WORDS["yes"]
 _BELOW_TRIALS: Final = "Delete the rows below the trials; if these are trials, number all in a column called trial."
 _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
@@ -97,11 +101,16 @@ def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> N
         if (remark := next(filter(is_verdict, remarks), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
+        mishaps = {text for text in {*column.texts} if plain(text) not in _NO_REMARKS and is_mishap(text)}
+        told = [row for row, text in enumerate(column.texts) if text in mishaps]
+        if 0 < _ROWS_A_WORD * len(told) <= len(column.cells) and column.name not in where:
+            remedy = f'Mark such rows in a column called exclude; if they count, say --where "{column.name}={ALL}".'
+            raise column.refused(told[0], "may say why the trial does not count", remedy)
 
 
 def require_no_summaries(columns: Columns, apart: int | None) -> None:
     """Raise if rows from one `apart` on, or with more digits than others, are by their numbers means or SDs."""
-    isi, mep = columns["isi"], columns["mep"]
+    isi, mep, order = columns["isi"], columns["mep"], columns["order"]
     numbers = {row: number for row in columns.rows if (number := mep.number(row)) is not None}
     known, meps = [*numbers], np.array([*numbers.values()]) / mep.factor
     isis = isi.numbers[known]
@@ -112,23 +121,61 @@ def require_no_summaries(columns: Columns, apart: int | None) -> None:
     ):
         above, of_isis = meps[:begin], isis[:begin]
         agree = [_is_summary(meps[n], digits[n], above, above[of_isis == isis[n]]) for n in range(begin, len(known))]
-        if len(above) < _FEW or columns["order"].text(known[begin]) or 2 * sum(agree) <= len(agree):
+        if len(above) < _FEW or order.text(known[begin]) or 2 * sum(agree) <= len(agree):
             continue
         finer = digits[begin] > max(digits[:begin]) or np.isclose(isis[begin], np.nanmean(of_isis), rtol=1e-3)
         if below == begin or (finer and agree[0]):
             raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
+    unnumbered = [n for n, row in enumerate(known) if not order.text(row) and "order" in columns.of]
+    if (
+        unnumbered
+        and len(known) - unnumbered[0] == len(unnumbered) <= _BELOW_AT_MOST
+        and not np.isfinite(isis[unnumbered]).any()
+    ):
+        why = f"has no ISI, and no number in the column {order.name!r}, as a mean or a sum has"
+        raise mep.refused(known[unnumbered[0]], why, _BELOW_TRIALS)
+    _require_none_below(mep, known, isis, digits, below)
     begins = [-1, *(n for n, count in enumerate(digits) if count == max(digits))]
     parts = [(end, meps[begin + 1 : end]) for begin, end in pairwise(begins)]  # each below trials of its own
     if 1 < len(begins) <= len(known) / _ROWS_A_PART and all(_is_summary(meps[n], digits[n], one) for n, one in parts):
         raise mep.refused(known[begins[1]], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
 
 
+def _require_none_below(mep: Column, known: Sequence[int], isis: FloatArray, digits: Sequence[int], below: int) -> None:
+    """Raise if the last rows, which have no ISI, are too well figures of all above, of pairs, or of TMS alone."""
+    meps, paired = mep.numbers[known], np.isfinite(isis)
+    slacks = np.maximum(0.51 * 10.0 ** -np.array(digits, dtype=float), 1e-9 * meps)
+    first = int(np.flatnonzero(paired).max(initial=-1)) + 1
+    for begin in range(max(first, len(meps) - _BELOW_AT_MOST, _SEVERAL), len(meps)):
+        above = meps[:begin]
+        kinds = [_figures(one) for one in (above, above[paired[:begin]], above[~paired[:begin]])]
+        usual, every = (np.concatenate([one[:most] for one in kinds]) for most in (_USUAL, None))
+        for figures in (usual[: _USUAL // 2], usual, every):
+            are_so = (abs(figures[:, None] - meps) <= slacks).any(axis=0)
+            by_chance = max(are_so[:begin].sum() - 2, 0.5) / begin  # two are the least and the largest
+            chance = float(np.prod(np.where(meps[begin:] > 2 * above.max(), _CHANCE, by_chance)))
+            if are_so[begin:].all() and chance * (_CHANCE if below == begin else 1.0) < _CHANCE:
+                raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
+
+
 def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
     """True if a number is, as far as its digits say, a mean or median of others, their SD, or its standard error."""
-    slack, of = max(0.51 * 10.0**-digits, 1e-9 * abs(number)), [group for group in groups if len(group) > 1]
-    sds = [(sd := float(np.std(group, ddof=one)), sd / len(group) ** 0.5) for group in of for one in (0, 1)]
-    means = [each for group in of for each in (np.mean(group), np.median(group))]
-    return number not in groups[0] and any(abs(each - number) <= slack for each in (*means, *chain(*sds)))
+    slack = max(0.51 * 10.0**-digits, 1e-9 * abs(number))
+    return number not in groups[0] and any((abs(_figures(one)[:_USUAL] - number) <= slack).any() for one in groups)
+
+
+def _figures(values: FloatArray) -> FloatArray:
+    """What stands below numbers, the most usual first: mean, SD, the least and the largest."""
+    if len(values) < 2:
+        return np.empty(0)
+    mean, sds = float(np.mean(values)), np.array([np.std(values, ddof=one) for one in (0, 1)])
+    geometric = np.exp(np.log(values[values > 0]).mean()) if (values > 0).any() else 0.0
+    quarters = [*np.quantile(values, [0.25, 0.75]), *statistics.quantiles(values.tolist())[::2]]
+    cvs = sds / mean if mean else sds
+    usual = [mean, sds[1], values.min(), values.max(), np.median(values), sds[0], *(sds / len(values) ** 0.5)]
+    return np.array(
+        [*usual, *quarters, np.ptp(values), values.sum(), len(values), *sds**2, *cvs, *(100 * cvs), geometric]
+    )
 
 
 def require_short(delivered: Delivered, layout: Layout) -> None:

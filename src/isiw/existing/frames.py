@@ -220,13 +220,13 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
     sheets, heads, titles = dict[str, list[list[Any]]](), dict[str, int](), dict[str, str]()
     for name in [layout.sheet] if layout.sheet is not None else map(str, book.sheet_names):
-        cells = book.parse(name, header=None, dtype=object, keep_default_na=False).to_numpy().tolist()
+        cells = _cells(book.book[name])
         rows = cells[layout.skip_lines :]
         first = next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0)
         sheets[name] = rows if layout.names else rows[first:]
         heads[name] = len(cells) - len(sheets[name]) + (0 if layout.names else 1)
-        above = chain.from_iterable(cells[: max(heads[name] - 1, 0)])
-        titles[name] = "\n".join([name, *(cell for cell in above if isinstance(cell, str))])
+        above = [[str(cell) for cell in row if not is_missing(cell)] for row in cells[: max(heads[name] - 1, 0)]]
+        titles[name] = "\n".join([name, *map(" ".join, above)])
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
     if len(with_trials) > 1:
         what = "several sheets of the workbook hold trials"
@@ -250,6 +250,13 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
             rows[0] = [f"{name} ({unit})" if unit else name for name, unit in pairs]
             break
     return _table(rows, layout, titles[chosen])
+
+
+def _cells(sheet: Any) -> list[list[Any]]:
+    """The rows of a sheet up to the last that is filled, an error such as #DIV/0! as its text."""
+    frame = pd.DataFrame([*sheet.iter_rows(values_only=True)], dtype=object)
+    rows, columns = (int(np.flatnonzero(frame.notna().any(axis=axis)).max(initial=-1)) + 1 for axis in (1, 0))
+    return cast("list[list[Any]]", frame.iloc[:rows, :columns].to_numpy().tolist())
 
 
 def _flag_coloured(rows: list[list[Any]], coloured: Iterable[int]) -> None:

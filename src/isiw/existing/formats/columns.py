@@ -62,7 +62,7 @@ def read(path: Path, layout: Layout) -> Contents:
 
 def of_emg(text: str) -> str:
     """The lines of a text that are of EMG."""
-    return "\n".join(line for line in text.splitlines() if re.search(r"(?i)\bemg\b", line))
+    return "\n".join(line for line in text.splitlines() if re.search(r"(?i)\bemg\b|amplifier|verstärk|^\W*gain", line))
 
 
 def required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:
