@@ -12,7 +12,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import LONGEST_ISI_MS
-from isiw.existing.layout import COLUMNS, EMG_UNITS, letters, unit_named
+from isiw.existing.layout import COLUMNS, EMG_UNITS, letters, unit_in
 from isiw.existing.names import ALL, RELATIVE, WHOLE, words_of
 from isiw.findings import AMPLITUDE_MV
 from isiw.types import FloatArray
@@ -180,7 +180,8 @@ def _require_uncut(columns: Columns) -> None:
     times = Counter(number for row in rows if (number := mep.number(row)))
     for odd, is_what in ((max(times, default=0.0), "saturated"), (min(times, default=0.0), "below a limit")):
         usual = max((count for number, count in times.items() if number != odd), default=len(rows))
-        if len(rows) >= _FEWEST and times[odd] >= _FEW * usual and mep.name not in columns.layout.where:
+        apart = times[odd] >= _FEW and odd > 2 * max((number for number in times if number != odd), default=odd)
+        if len(rows) >= _FEWEST and (times[odd] >= _FEW * usual or apart) and mep.name not in columns.layout.where:
             remedy = "Write 0 for an MEP below the limit, and leave the cell of a saturated one empty; if all are as "
             remedy += f'they were measured, say --where "{mep.name}={ALL}".'
             got = f"{times[odd]} times {odd / mep.factor:g}"
@@ -228,7 +229,7 @@ def _halves_beside(columns: Columns) -> dict[str, FloatArray]:
 
 def _has_unit(name: str) -> bool:
     """True if a name has the unit of an amplitude."""
-    return any(unit_named(word) in EMG_UNITS for word in re.findall(r"[^\W_]+", name))
+    return unit_in(name) in EMG_UNITS
 
 
 def _require_one_row_each(columns: Columns) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import Delivered
-from isiw.existing.layout import WORDS, Layout, letters, plain
+from isiw.existing.layout import WORDS, Layout, letters, plain, unit_in
 from isiw.existing.names import (
     ALL,
     MEANS,
@@ -31,7 +31,7 @@ from isiw.existing.names import (
 )
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
-from isiw.types import FloatArray
+from isiw.types import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from isiw.existing.quantities import Columns
@@ -308,20 +308,29 @@ def _require_one_kind(columns: Columns) -> None:
         if alone and len({*texts.values()}) > 1:
             remedy = f'Say --column "condition={name}"; if these are pairs, say --where "{name}={ALL}".'
             raise column.refused(alone[0], "says TMS alone, and nothing is read of it", remedy)
-        if {*texts.values()} <= {"", *WORDS["yes"], *WORDS["no"]} and _are_flags(texts, by_isi):
+        said = np.array([texts[row] in WORDS["yes"] for _, row in by_isi])
+        if {*texts.values()} <= {"", *WORDS["yes"], *WORDS["no"]} and _are_flags(said, by_isi):
             remedy = f'If yes leaves a trial out, say --column "exclude={name}"; if no does, --column "status={name}"; '
             remedy += f'if all are to be analysed together, --where "{name}={ALL}".'
             raise column.doubted("says yes or no of each pair, and nothing is read of it", None, remedy)
-        if kinds := kinds_at_each(by_isi, column):
+        if kinds := kinds_at_each(by_isi, column) or _seldom_states(texts, by_isi, column):
             few = ", ".join(kinds[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
             remedy = f'Say --where "{name}={kinds[0]}" for one of them, --where "{name}={ALL}" if all are to '
             remedy += f'be analysed together, or --column "subject={name}" if they are people.'
             raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
 
 
-def _are_flags(texts: Mapping[int, str], by_isi: Sequence[tuple[float, int]]) -> bool:
+def _seldom_states(texts: Mapping[int, str], by_isi: Sequence[tuple[float, int]], column: Column) -> list[str]:
+    """Two or three numbers of which one is seldom, and not of a range of ISIs, as a state without the tap is."""
+    times = Counter(text for text in texts.values() if text)
+    if len(times) not in {2, 3} or not all(re.fullmatch(r"\d", text) for text in times) or min(times.values()) < _FEW:
+        return []
+    said = np.array([texts[row] == min(times, key=lambda text: times[text]) for _, row in by_isi])
+    return [*times] if _are_flags(said, by_isi) and not _counts_again(column, by_isi) else []
+
+
+def _are_flags(said: BoolArray, by_isi: Sequence[tuple[float, int]]) -> bool:
     """True if yes and no are not of a range of several ISIs, as of those with a response."""
-    said = np.array([texts[row] in WORDS["yes"] for _, row in by_isi])
     if said.all() or not said.any():
         return False
     isis_ms = np.array([isi_ms for isi_ms, _ in by_isi])
@@ -338,7 +347,8 @@ def kinds_at_each(by_isi: Sequence[tuple[float, int]], column: Column) -> list[s
     kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
     if len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
         return []
-    if not are_words and (len(kinds) > len(by_isi) / _ROWS_A_NUMBER or _counts_again(column, by_isi)):
+    is_measure = len(kinds) > _FEW and (unit_in(column.name) or not all(map(str.isdigit, kinds)))
+    if not are_words and (is_measure or len(kinds) > len(by_isi) / _ROWS_A_NUMBER or _counts_again(column, by_isi)):
         return []
     usual = min(kinds.values()) if are_words else len(texts) / len(kinds)
     size = min(math.ceil(4 * len(texts) / usual), len(texts) // 2)

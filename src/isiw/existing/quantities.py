@@ -102,6 +102,7 @@ class Columns:
                 units = units_beside(key, name, frame) or _units_above(key, name, frame)
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
+                columns[key].require_no_errors()
                 of_units |= units.keys()
         columns, stated = _scaled(columns, layout)
         columns |= _with_taps_alone(replace(columns["isi"], remedy=_OF_ISIS), columns.get("tap_alone"))
