@@ -57,6 +57,7 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
     spreads = [name for name in others if says_only(name, WORDS["spreads"])]
     numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in WORDS["numbers"]}
+    averaged = [name for name in numbers if re.search("sweep|averag|mep", letters(name))]
     counted_in = [name for name, texts in numbers.items() if 2 * len({*texts}) <= len(texts)
                   and all(text.isdigit() and int(text) > 1 for text in texts)]  # fmt: skip
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
@@ -74,9 +75,10 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
     if mep.name not in layout.where:
         bare = [row for row, cells in enumerate(zip(mep.texts, isi.texts, strict=True)) if not any(cells)]
         below = [", ".join(cell for cells in others.values() if isinstance(cell := cells[row], str)) for row in bare]
-        require_title("\n".join([heading, *below]), mep, layout.reference)
+        require_title("\n".join([heading, *below]), mep, layout.reference, frame.attrs.get("notes", ""))
     title = TITLES_OF_MEANS.search(words_of(heading)) if once else None
-    if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
+    is_counted = bool(counted_in) and (once or counted_in[0] in averaged)
+    if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or is_counted:
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"
         what += "".join(f" beside {name!r}" for name in beside)
@@ -151,7 +153,7 @@ def _require_none_below(mep: Column, known: Sequence[int], isis: FloatArray, dig
         kinds = [_figures(one) for one in (above, above[paired[:begin]], above[~paired[:begin]])]
         usual, every = (np.concatenate([one[:most] for one in kinds]) for most in (_USUAL, None))
         for figures in (usual[: _USUAL // 2], usual, every):
-            are_so = (abs(figures[:, None] - meps) <= slacks).any(axis=0)
+            are_so = np.any(abs(figures[:, None] - meps) <= slacks, axis=0)
             by_chance = max(are_so[:begin].sum() - 2, 0.5) / begin  # two are the least and the largest
             chance = float(np.prod(np.where(meps[begin:] > 2 * above.max(), _CHANCE, by_chance)))
             if are_so[begin:].all() and chance * (_CHANCE if below == begin else 1.0) < _CHANCE:
@@ -316,7 +318,8 @@ def _require_one_kind(columns: Columns) -> None:
         if kinds := kinds_at_each(by_isi, column) or _seldom_states(texts, by_isi, column):
             few = ", ".join(kinds[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
             remedy = f'Say --where "{name}={kinds[0]}" for one of them, --where "{name}={ALL}" if all are to '
-            remedy += f'be analysed together, or --column "subject={name}" if they are people.'
+            remedy += f'be analysed together, or --column "subject={name}" if they are people; if one is TMS alone, '
+            remedy += "write that in place of its ISIs."
             raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
 
 

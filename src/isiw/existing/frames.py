@@ -31,6 +31,7 @@ _NOTE: Final = re.compile(rb'(?s)<comment ref="[A-Z]+(\d+)"(.*?)</comment>')
 _TEXT: Final = re.compile(r"(?s)<t(?: [^>]*)?>([^<]*)</t>")
 _LINES, _HEAD = 100, 40  # within so many lines the columns' names are sought; so many bytes show how a text is encoded
 _BLANKS: Final = r"\s+"
+_WORDS: Final = 2  # blanks at least are in a line of text
 _OF_TRIALS: Final = re.compile(
     r"^(?!n\b|num|count).*(trial|sweep|frame|idx|ind(ex|ices))"
 )  # a number that may be one's own
@@ -95,12 +96,13 @@ def _texts(text: str, layout: Layout) -> pd.DataFrame:
     lines = every[layout.skip_lines :]
     first = 0 if layout.names else _first(lines, layout)
     title, lines = "".join(lines[:first]), lines[first:]
-    separator = layout.separator or _separator(lines[0].lstrip("# ") if lines else "")
+    separator = layout.separator or _separator(lines)
     if lines and lines[0].startswith("#"):
         lines = [*_first_part(lines, separator)]
     title += "".join(line for line in lines if line.startswith("# "))
     lines = [line for line in lines if not line.startswith("# ")]
-    every_row = [*_split(lines, separator)]
+    every_row, foot = _without_foot([*_split(lines, separator)])
+    title += foot
     table = _table([row for row in every_row if row], layout, title)
     below = len(every_row) - next((n for n in range(len(every_row), 1, -1) if not every_row[n - 1]), 0)
     table.attrs["apart"] = len(table) - below if below < len(table) else None
@@ -126,7 +128,7 @@ def _first(lines: Sequence[str], layout: Layout) -> int:
     """The line with the columns' names: those below it have as many cells, or at least it has a sign between names."""
     found = []
     for number, line in enumerate(lines[:_LINES]):
-        separator = layout.separator or _separator(line.lstrip("# "))
+        separator = layout.separator or _separator(lines[number : number + 2])
         names, *below = _split([line.lstrip("# "), *lines[number + 1 : number + 3]], separator)
         if _is_header(names, layout):
             found.append((not all(len(row) >= len(names) for row in below if row), separator == _BLANKS, number))
@@ -172,6 +174,24 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     return table
 
 
+def _text_in(rows: Iterable[Sequence[Any]]) -> str:
+    return "\n".join(" ".join(str(cell) for cell in row if not is_missing(cell)) for row in rows)
+
+
+def _without_foot(rows: list[list[Any]]) -> tuple[list[list[Any]], str]:
+    """Rows without lines of text below them, and these lines."""
+    kept, foot = len(rows), ""
+    for row in reversed(rows):
+        if len(said := [cell for cell in row if not is_missing(cell)]) > 1 or not all(map(_is_line, said)):
+            break
+        kept, foot = kept - 1, "\n".join([*said, foot])
+    return (rows[:kept], f"\n{foot}") if foot.strip() else (rows, "")
+
+
+def _is_line(cell: Any) -> bool:
+    return isinstance(cell, str) and cell.count(" ") >= _WORDS
+
+
 def _unit_below(cell: str) -> str | None:
     """What a cell below a name adds to it: a unit, or words with a unit behind them, such as amplitude (mV)."""
     if unit := unit_named(cell.strip().strip("[]()")):
@@ -197,9 +217,11 @@ def decoded(content: bytes) -> str:
     return content.decode("cp1252", errors="replace")
 
 
-def _separator(line: str) -> str:
-    counts = {sign: line.count(sign) for sign in ("\t", ";", ",", "|")}
-    best = max(counts, key=lambda sign: counts[sign])
+def _separator(lines: Sequence[str]) -> str:
+    """The sign between names that comes as often in the line below, or else most often."""
+    line, below = ([one.lstrip("# ") for one in lines[:2]] + ["", ""])[:2]
+    counts = {sign: line.count(sign) for sign in ("\t", ";", "|", ",")}
+    best = max(counts, key=lambda sign: (0 < counts[sign] == below.count(sign), counts[sign]))
     return best if counts[best] else _BLANKS
 
 
@@ -220,13 +242,12 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
     sheets, heads, titles = dict[str, list[list[Any]]](), dict[str, int](), dict[str, str]()
     for name in [layout.sheet] if layout.sheet is not None else map(str, book.sheet_names):
-        cells = _cells(book.book[name])
+        cells, foot = _without_foot(_cells(book.book[name]))
         rows = cells[layout.skip_lines :]
         first = next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0)
         sheets[name] = rows if layout.names else rows[first:]
         heads[name] = len(cells) - len(sheets[name]) + (0 if layout.names else 1)
-        above = [[str(cell) for cell in row if not is_missing(cell)] for row in cells[: max(heads[name] - 1, 0)]]
-        titles[name] = "\n".join([name, *map(" ".join, above)])
+        titles[name] = f"{name}\n{_text_in(cells[: max(heads[name] - 1, 0)])}{foot}"
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
     if len(with_trials) > 1:
         what = "several sheets of the workbook hold trials"
@@ -249,14 +270,16 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
             pairs = zip_longest(rows[0], shown[: len(rows[0])])
             rows[0] = [f"{name} ({unit})" if unit else name for name, unit in pairs]
             break
-    return _table(rows, layout, titles[chosen])
+    table = _table(rows, layout, titles[chosen])
+    table.attrs["notes"] = "\n".join(f"{titles[name]}\n{_text_in(sheets[name])}" for name in sheets if name != chosen)
+    return table
 
 
 def _cells(sheet: Any) -> list[list[Any]]:
     """The rows of a sheet up to the last that is filled, an error such as #DIV/0! as its text."""
     frame = pd.DataFrame([*sheet.iter_rows(values_only=True)], dtype=object)
     rows, columns = (int(np.flatnonzero(frame.notna().any(axis=axis)).max(initial=-1)) + 1 for axis in (1, 0))
-    return cast("list[list[Any]]", frame.iloc[:rows, :columns].to_numpy().tolist())
+    return frame.iloc[:rows, :columns].to_numpy().tolist()
 
 
 def _flag_coloured(rows: list[list[Any]], coloured: Iterable[int]) -> None:

@@ -86,8 +86,8 @@ _ANY_TITLES: Final = {
     rf"(%|per ?cent|prozent|pour ?cent|por ?ciento) (of|vom|von|der|de|du|del|van) ?(the )?{_BASES}|"
     r"\bnormali[sz]ed\b|\bnormiert|\bmeps? ?/": "to be relative",
     r"\b(averages?|averaged|means?|mittel\w*|gemittelt|moyennes?) (of|over|across|von|aus|über|de) "
-    r"(\d+|two|three|four|five|six|eight|ten|several) "
-    r"(meps|sweeps|trials|pulses|stimuli|responses)": "to be means of several trials",
+    r"(\d+|two|three|four|five|six|eight|ten|several) (meps|sweeps|trials|pulses|stimuli|responses)|"
+    r"\b(meps|sweeps|trials|frames|pulses) (averaged|gemittelt)\W*(?!1\b)\d": "to be means of several trials",
 }  # what a title says in whatever clause
 _TITLES: Final = {
     r"%|per ?cent|prozent|pour ?cent|por ?ciento|\bz-? ?scor|\blog\w*[- ](transf|of|mep|amp)|\blogarithm|\bratios?\b|"
@@ -153,15 +153,18 @@ def require_order(isi: Column) -> None:
             raise isi.doubted(says, found[0], remedy)
 
 
-def require_title(title: str, mep: Column, reference: Reference | None) -> None:
-    """Raise if a title, or what stands below the trials, says what amplitudes or ISIs are, or which do not count."""
+def require_title(title: str, mep: Column, reference: Reference | None, notes: str = "") -> None:
+    """Raise if a title, or what stands below the trials, says what amplitudes or ISIs are, or which do not count.
+
+    Of notes elsewhere, as on other sheets, it must say nothing of trials that do not count, and no gain.
+    """
     remedy = f'If not, correct the title, or the name of the file or sheet, or say --where "{mep.name}={ALL}".'
-    said = words_of(title)
-    if (found := _LISTED.search(" ".join(said.split()))) is not None:
+    said, every = words_of(title), words_of(f"{title}\n{notes}")
+    if (found := _LISTED.search(" ".join(every.split()))) is not None:
         what = f"a line of {mep.of} beside the table says which trials do not count"
         left_out = "Mark them in a column called exclude, and remove that line; if they are left out already, say "
         raise InvalidValueError(what, got=found[0], remedy=f'{left_out}--where "{mep.name}={ALL}".')
-    if (found := _A_GAIN.search(said)) is not None and not _AT_ELECTRODES.search(said):
+    if (found := _A_GAIN.search(every)) is not None and not _AT_ELECTRODES.search(every):
         raise mep.doubted("stands below a title that says a gain", found[0], _OF_GAIN.format(mep.name))
     for clause in (" ".join(each.split()) for each in _CLAUSES.split(said)):
         origin = rf"{_AFTER} (the )?(\w+ ){{0,2}}?({_ORIGINS[reference]})" if reference is not None else "(?!)"
