@@ -204,7 +204,7 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 
 def require_one_kind_each(columns: Columns) -> None:
     """Raise if rows are not of one person's single trials of one muscle, in their order and in one unit."""
-    for doubt in (_require_ascending, require_said, _require_one_kind, _require_one_intensity):
+    for doubt in (_require_ascending, _require_said, _require_one_kind, _require_one_intensity):
         doubt(columns)
 
 
@@ -264,7 +264,7 @@ def _require_ascending(columns: Columns) -> None:
         raise InvalidValueError(what, got=f"{twice[0]:g}", remedy=remedy)
 
 
-def require_said(columns: Columns) -> None:
+def _require_said(columns: Columns) -> None:
     """Raise if it is not stated what rows without an ISI are, or if a row is both a pair and TMS alone."""
     isi, condition, paired = columns["isi"], columns["condition"], columns.paired
     one_word = len({*map(plain, map(condition.text, columns.rows))}) == 1  # in all rows it means nothing
@@ -315,7 +315,7 @@ def _require_one_kind(columns: Columns) -> None:
             remedy = f'If yes leaves a trial out, say --column "exclude={name}"; if no does, --column "status={name}"; '
             remedy += f'if all are to be analysed together, --where "{name}={ALL}".'
             raise column.doubted("says yes or no of each pair, and nothing is read of it", None, remedy)
-        if kinds := kinds_at_each(by_isi, column) or _seldom_states(texts, by_isi, column):
+        if kinds := kinds_at_each(by_isi, column):
             few = ", ".join(kinds[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
             remedy = f'Say --where "{name}={kinds[0]}" for one of them, --where "{name}={ALL}" if all are to '
             remedy += f'be analysed together, or --column "subject={name}" if they are people; if one is TMS alone, '
@@ -323,13 +323,16 @@ def _require_one_kind(columns: Columns) -> None:
             raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
 
 
-def _seldom_states(texts: Mapping[int, str], by_isi: Sequence[tuple[float, int]], column: Column) -> list[str]:
-    """Two or three numbers of which one is seldom, and not of a range of ISIs, as a state without the tap is."""
-    times = Counter(text for text in texts.values() if text)
-    if len(times) not in {2, 3} or not all(re.fullmatch(r"\d", text) for text in times) or min(times.values()) < _FEW:
+def _seldom_states(by_isi: Sequence[tuple[float, int]], column: Column) -> list[str]:
+    """Two or three numbers, or words of all, of which one is seldom, and not of a range of ISIs, as a state may be."""
+    texts = [column.text(row) for _, row in by_isi]
+    times = Counter(filter(None, texts))
+    are_states = all(texts) or all(re.fullmatch(r"\d", text) for text in times)
+    if len(times) not in {2, 3} or not are_states or min(times.values()) < _FEW:
         return []
-    said = np.array([texts[row] == min(times, key=lambda text: times[text]) for _, row in by_isi])
-    return [*times] if _are_flags(said, by_isi) and not _counts_again(column, by_isi) else []
+    said = np.array(texts) == min(times, key=lambda text: times[text])
+    has_isis = np.unique(np.array([isi_ms for isi_ms, _ in by_isi])[said]).size > 1  # or else it stands for one
+    return [*times] if has_isis and _are_flags(said, by_isi) and not _counts_again(column, by_isi) else []
 
 
 def _are_flags(said: BoolArray, by_isi: Sequence[tuple[float, int]]) -> bool:
@@ -349,7 +352,7 @@ def kinds_at_each(by_isi: Sequence[tuple[float, int]], column: Column) -> list[s
     are_words = not any(map(_NUMBER.fullmatch, texts))
     kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
     if len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
-        return []
+        return _seldom_states(by_isi, column)
     is_measure = len(kinds) > _FEW and (unit_in(column.name) or not all(map(str.isdigit, kinds)))
     if not are_words and (is_measure or len(kinds) > len(by_isi) / _ROWS_A_NUMBER or _counts_again(column, by_isi)):
         return []
@@ -358,7 +361,7 @@ def kinds_at_each(by_isi: Sequence[tuple[float, int]], column: Column) -> list[s
     bins = [texts[first : first + size] for first in range(0, len(texts) - size + 1, size)]
     shares = [len(kinds.keys() & {*each}) / len(kinds) for each in bins]
     several = sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins)
-    return [*kinds] if several else []
+    return [*kinds] if several else _seldom_states(by_isi, column)
 
 
 def _counts_again(column: Column, by_isi: Sequence[tuple[float, int]]) -> bool:

@@ -15,7 +15,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing, required_unit
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubtful_numbers import require_plain_isis
-from isiw.existing.doubts import is_rectified, require_said
+from isiw.existing.doubts import is_rectified, require_one_kind_each
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
@@ -258,7 +258,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
         what = f"{contents.source} does not say the ISI of each sweep"
         raise InvalidValueError(what, got=f"{len(trials)} rows and {len(emg.stretches)} sweeps")
     columns = Columns.found(trials, stated, contents.source, needed=("isi",))
-    require_said(columns)
+    require_one_kind_each(columns)
     require_plain_isis(columns)
     marks = {key: marked(contents.events, key, layout) for key in (origin_key(layout), "pulse", "alone")}
     pulses = list[Pulse]()
