@@ -38,12 +38,13 @@ if TYPE_CHECKING:
 
 _INTENSITY: Final = re.compile(r"intensit|\bmso\b|\boutput\b|\bstrength\b|stärke\b|\bpower\b|\b[ab][ -]amplitude\b")
 _NUMBER: Final = re.compile(r"[-.,]*\d[\d.,]*")
-_FEW, _BELOW_AT_MOST, _BELOW = 3, 9, 50  # so many rows at most are below the trials
+_FEW, _BELOW_AT_MOST, _BELOW = 3, 20, 50  # so many rows at most are below the trials
 _SEVERAL: Final = 12  # in a table with fewer rows most may be left out
 _CODE: Final = 4  # a shorter text in rows that follow may be initials
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
 _ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
+_LAST: Final = 2000  # so many rows at most are compared with those below them
 _USUAL: Final = 8  # figures are what stands below trials in most files, the first half of these in nearly all
 _CHANCE: Final = 0.02  # with which single trials are hardly by chance what they seem
 _NO_REMARKS: Final = WORDS["alone"] | WORDS["tap alone"] | WORDS["yes"]
@@ -116,7 +117,7 @@ def require_no_summaries(columns: Columns, apart: int | None) -> None:
     numbers = {row: number for row in columns.rows if (number := mep.number(row)) is not None}
     known, meps = [*numbers], np.array([*numbers.values()]) / mep.factor
     isis = isi.numbers[known]
-    digits = [len(mep.texts[row].partition(mep.decimal)[2]) for row in known]
+    digits = [_digits(mep, row) for row in known]
     below = next((n for n, row in enumerate(known) if apart is not None and row >= apart), len(known))
     for begin in sorted(
         {max(below, len(known) - _BELOW), *range(max(len(known) - _FEW, 0), len(known))} - {len(known)}
@@ -136,28 +137,33 @@ def require_no_summaries(columns: Columns, apart: int | None) -> None:
     ):
         why = f"has no ISI, and no number in the column {order.name!r}, as a mean or a sum has"
         raise mep.refused(known[unnumbered[0]], why, _BELOW_TRIALS)
-    _require_none_below(mep, known, isis, digits, below)
+    _require_none_below(mep, isi, known[-_LAST:], apart)
     begins = [-1, *(n for n, count in enumerate(digits) if count == max(digits))]
     parts = [(end, meps[begin + 1 : end]) for begin, end in pairwise(begins)]  # each below trials of its own
     if 1 < len(begins) <= len(known) / _ROWS_A_PART and all(_is_summary(meps[n], digits[n], one) for n, one in parts):
         raise mep.refused(known[begins[1]], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
 
 
-def _require_none_below(mep: Column, known: Sequence[int], isis: FloatArray, digits: Sequence[int], below: int) -> None:
+def _require_none_below(mep: Column, isi: Column, known: Sequence[int], apart: int | None) -> None:
     """Raise if the last rows, which have no ISI, are too well figures of all above, of pairs, or of TMS alone."""
-    meps, paired = mep.numbers[known], np.isfinite(isis)
-    slacks = np.maximum(0.51 * 10.0 ** -np.array(digits, dtype=float), 1e-9 * meps)
+    meps, isis, digits = mep.numbers[known], isi.numbers[known], [_digits(mep, row) for row in known]
+    paired, slacks = np.isfinite(isis), np.maximum(0.51 * 10.0 ** -np.array(digits, dtype=float), 1e-9 * meps)
     first = int(np.flatnonzero(paired).max(initial=-1)) + 1
     for begin in range(max(first, len(meps) - _BELOW_AT_MOST, _SEVERAL), len(meps)):
         above = meps[:begin]
         kinds = [_figures(one) for one in (above, above[paired[:begin]], above[~paired[:begin]])]
+        of_each = [float(above[isis[:begin] == isi].mean()) for isi in np.unique(isis[paired])[:_BELOW_AT_MOST]]
         usual, every = (np.concatenate([one[:most] for one in kinds]) for most in (_USUAL, None))
-        for figures in (usual[: _USUAL // 2], usual, every):
+        for figures in (usual[: _USUAL // 2], usual, every, np.array(of_each)):
             are_so = np.any(abs(figures[:, None] - meps) <= slacks, axis=0)
             by_chance = max(are_so[:begin].sum() - 2, 0.5) / begin  # two are the least and the largest
             chance = float(np.prod(np.where(meps[begin:] > 2 * above.max(), _CHANCE, by_chance)))
-            if are_so[begin:].all() and chance * (_CHANCE if below == begin else 1.0) < _CHANCE:
+            if are_so[begin:].all() and chance * (_CHANCE if apart == known[begin] else 1.0) < _CHANCE:
                 raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
+
+
+def _digits(column: Column, row: int) -> int:
+    return len(column.texts[row].partition(column.decimal)[2])
 
 
 def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:

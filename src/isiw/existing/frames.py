@@ -189,7 +189,7 @@ def _without_foot(rows: list[list[Any]]) -> tuple[list[list[Any]], str]:
 
 
 def _is_line(cell: Any) -> bool:
-    return isinstance(cell, str) and cell.count(" ") >= _WORDS
+    return isinstance(cell, str) and (cell.count(" ") >= _WORDS or ": " in cell)
 
 
 def _unit_below(cell: str) -> str | None:

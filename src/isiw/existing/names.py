@@ -45,7 +45,7 @@ _MEASURES: Final = (
     r"\b[mµμu]?v([²/]| ?[*·×] ?m?s\b|m?s\b)"
 )
 _ENDS: Final = rf"^(?!.*({WHOLE})).*\b(trough|max|maximum|min|minimum)\b"
-_GAIN: Final = r"\bgain\b|amplifi(ed|cation)|verstärk"
+_GAIN: Final = r"\bgain(?![^\W\d])|amplifi(ed|cation)|verstärk"
 _A_GAIN: Final = re.compile(
     rf"({_GAIN})\w*\W*((factor|of|by|x|=)\W*)*(?!1(\.0*)?\b)\d+|\b\d+ ?(x|fold|fach|times)\w* ({_GAIN})"
 )  # with a number that is not 1
