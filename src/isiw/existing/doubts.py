@@ -104,7 +104,8 @@ def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> N
         if (remark := next(filter(is_verdict, remarks), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
-        mishaps = {text for text in {*column.texts} if plain(text) not in _NO_REMARKS and is_mishap(text)}
+        some = (text for text in {*column.texts} if not _NUMBER.fullmatch(text) and plain(text) not in _NO_REMARKS)
+        mishaps = {*filter(is_mishap, some)}
         told = [row for row, text in enumerate(column.texts) if text in mishaps]
         if 0 < _ROWS_A_WORD * len(told) <= len(column.cells) and column.name not in where:
             remedy = f'Mark such rows in a column called exclude; if they count, say --where "{column.name}={ALL}".'
@@ -138,7 +139,8 @@ def require_no_summaries(columns: Columns, apart: int | None) -> None:
         why = f"has no ISI, and no number in the column {order.name!r}, as a mean or a sum has"
         raise mep.refused(known[unnumbered[0]], why, _BELOW_TRIALS)
     _require_none_below(mep, isi, known[-_LAST:], apart)
-    begins = [-1, *(n for n, count in enumerate(digits) if count == max(digits))]
+    most = max(digits, default=0)
+    begins = [-1, *(n for n, count in enumerate(digits) if count == most)]
     parts = [(end, meps[begin + 1 : end]) for begin, end in pairwise(begins)]  # each below trials of its own
     if 1 < len(begins) <= len(known) / _ROWS_A_PART and all(_is_summary(meps[n], digits[n], one) for n, one in parts):
         raise mep.refused(known[begins[1]], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
