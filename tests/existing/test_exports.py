@@ -54,6 +54,9 @@ def test_other_measures_and_what_is_relative_are_known_by_more_names(name: str) 
         ("excluded trials: 4, 17", "which trials do not count"),
         ("artefacts in trials 3 and 8", "which trials do not count"),
         ("Ausgeschlossen: Nr. 7 und 12", "which trials do not count"),
+        ("Sweeps averaged: 4", "to be means of several trials"),
+        ("Amplifier gain: 1000", "says a gain"),
+        ("EMG verstärkt, Verstärkung 500", "says a gain"),
     ],
 )
 def test_a_line_above_or_below_the_trials_says_what_they_are(line: str, says: str, tmp_path: Path) -> None:
@@ -70,7 +73,8 @@ def test_a_line_above_or_below_the_trials_says_what_they_are(line: str, says: st
     ["TMS at 120 % of rMT; ISI 10-190 ms, 4 trials of each, ITI 5 s x 50", "valve-driven tapper, ISIs from impact",
      "Experiment 3 (bad weather)", "Mean RMT 45 %", "p2p amplitudes, no trials excluded", "each ISI repeated 4 times",
      "Artefact rejection 100 µV; excluded: 3 trials", "Filter 20-2000 Hz, gain 1000, amplitudes at the electrodes",
-     "MEPs at delays relative to the impact", "Afferent inhibition and MEP amplitudes, day 2"],
+     "MEPs at delays relative to the impact", "Afferent inhibition and MEP amplitudes, day 2", "gain 1",
+     "exported on 31 January by Signal 7"],
 )  # fmt: skip
 def test_other_lines_are_not_asked_about(line: str, tmp_path: Path) -> None:
     (tmp_path / "P01.csv").write_text(f"{line}\n{table().to_csv(index=False, sep=';')}", encoding="utf-8")
@@ -104,6 +108,78 @@ def test_more_remarks_leave_a_trial_out(remark: str) -> None:
 
 
 @pytest.mark.parametrize(
+    "remark",
+    ["noise", "muscle active", "-> out", "n.v.", "kein Schlag", "hammer stuck", "!", "EMG not silent", "arm moved"],
+)
+def test_remarks_of_what_may_keep_a_trial_from_counting_are_asked_about(remark: str) -> None:
+    with pytest.raises(IsiwError, match=r"row 5 of .* may say why the trial does not count.*--where \"note=\*\""):
+        read_people(table(note=few(remark, "")), EMPTY_IS_ALONE)
+    read_people(table(note=few(remark, "")), EMPTY_IS_ALONE.saying(where={"note": "*"}))
+    for usual in ("pause", "entspannt", "white noise on", "no noise", "contralateral", "coil moved"):
+        read_people(table(note=few(usual, "")), EMPTY_IS_ALONE)
+    read_people(table(note=["muscle active"] * 48), EMPTY_IS_ALONE)
+
+
+def test_a_gain_beside_the_amplitudes_is_asked_about() -> None:
+    with pytest.raises(IsiwError, match=r"'amp_gain' of .* has a gain.*--where \"amp_gain=\*\""):
+        read_people(table(amp_gain=1000), EMPTY_IS_ALONE)
+    assert len(trials_of(read_people(table(amp_gain=1), EMPTY_IS_ALONE))) == 48
+
+
+@pytest.mark.parametrize("states", [("1", "2"), ("rest", "active"), ("0", "3")])
+def test_a_state_that_is_seldom_is_asked_about_and_a_measure_of_few_values_is_not(states: tuple[str, str]) -> None:
+    with pytest.raises(IsiwError, match=r"'state' .* several values at each ISI.*write that in place of its ISIs"):
+        read_people(table(state=few(*states)), EMPTY_IS_ALONE)
+    for name, cells in (("latency_ms", 17 + np.arange(48) % 5), ("distance", 0.2 * (np.arange(48) % 5))):
+        assert len(trials_of(read_people(table(**{name: cells}), EMPTY_IS_ALONE))) == 48
+
+
+FIGURES: dict[str, Any] = {"max": max, "min": min, "mean": np.mean, "sd": lambda meps: np.std(meps, ddof=1), "sum": sum}
+
+
+@pytest.mark.parametrize("names", ["max min mean sd", "mean sd", "mean", "sum mean sd", "min max", "sum mean"])
+def test_figures_below_the_trials_are_no_tms_alone_whatever_is_said_of_empty_cells(names: str) -> None:
+    below = pd.DataFrame({"MEP (mV)": [round(float(FIGURES[name](MEPS)), 3) for name in names.split()]})
+    with pytest.raises(IsiwError, match=r"row 49 .* seems to be a mean of rows above, or an SD"):
+        read_people(pd.concat([table(), below], ignore_index=True), EMPTY_IS_ALONE)
+    last = pd.DataFrame({"MEP (mV)": [0.377, 0.281, 0.593]})
+    assert len(trials_of(read_people(pd.concat([table(), last], ignore_index=True), EMPTY_IS_ALONE))) == 51
+    numbered = pd.concat([table(trial=np.arange(1.0, 49.0)), last], ignore_index=True)
+    with pytest.raises(IsiwError, match=r"row 49 .* has no ISI, and no number in the column 'trial'"):
+        read_people(numbered, EMPTY_IS_ALONE)
+
+
+def test_a_code_for_too_large_an_amplitude_is_asked_about() -> None:
+    with pytest.raises(IsiwError, match=rf"got '\d times 9\.999'.*{WAY_OUT}"):
+        read_people(table(np.where(few(bad=True, good=False), 9.999, MEPS)), EMPTY_IS_ALONE)
+
+
+@pytest.mark.parametrize("column", ["ISI (ms)", "MEP (mV)", "accepted"])
+@pytest.mark.parametrize("error", ["#DIV/0!", "#N/A", "#WERT!", "#NV"])
+def test_an_error_of_excel_is_no_empty_cell(error: str, column: str, tmp_path: Path) -> None:
+    table(accepted=1, ratio=1.0).to_excel(tmp_path / "P01.xlsx", index=False)
+    book = openpyxl.load_workbook(tmp_path / "P01.xlsx")
+    cells = {str(cell.value): cell.column for cell in book.active[1]}
+    for name in ("ratio", column):
+        book.active.cell(7, cells[name], error).data_type = "e" if error in {"#DIV/0!", "#N/A"} else "s"
+        book.save(tmp_path / f"{name[:3]}.xlsx")
+    assert len(trials_of(read_people(tmp_path / "rat.xlsx", EMPTY_IS_ALONE))) == 48  # nothing is read of it
+    with pytest.raises(IsiwError, match=r"row 6 of .* is an error of Excel"):
+        read_people(tmp_path / f"{column[:3]}.xlsx", EMPTY_IS_ALONE)
+
+
+@pytest.mark.parametrize(("note", "says"), [("Trials 5 and 8 excluded", "do not count"), ("Gain 1000", "says a gain")])
+def test_another_sheet_may_say_a_gain_or_which_trials_do_not_count(note: str, says: str, tmp_path: Path) -> None:
+    for text in ("Summary of means, % of control", note):
+        with pd.ExcelWriter(tmp_path / f"{text[:5]}.xlsx", engine="openpyxl") as book:
+            table().to_excel(book, index=False, sheet_name="Data")
+            book.book.create_sheet("Notes").append([text])
+    assert len(trials_of(read_people(tmp_path / "Summa.xlsx", EMPTY_IS_ALONE))) == 48
+    with pytest.raises(IsiwError, match=rf"{says}.*{WAY_OUT}"):
+        read_people(tmp_path / f"{note[:5]}.xlsx", EMPTY_IS_ALONE)
+
+
+@pytest.mark.parametrize(
     ("name", "bad", "good", "key"),
     [("QC", "fail", "pass", "exclude"), ("check", "NOK", "OK", "exclude"), ("quality", "poor", "good", "exclude"),
      ("blink", "*", "", "exclude"), ("Auswahl", "", "x", "status"), ("valid (0 = ok)", 1, 0, "exclude"),
@@ -123,10 +199,14 @@ def test_a_column_without_a_name_is_read_for_remarks() -> None:
     assert read_people(table(**{"": [""] * 48}), EMPTY_IS_ALONE)[0].unused == ()
 
 
-@pytest.mark.parametrize("cell", ["<0.2", "none", "n.d.", "no MEP"])
-def test_words_for_no_mep_are_asked_about(cell: str) -> None:
+@pytest.mark.parametrize("cell", ["<0.2", "no MEP", "none", "n.d.", "-", "—", " -- ", "."])
+def test_words_and_dashes_for_no_mep_are_asked_about_unless_the_trial_is_lost(cell: str) -> None:
+    made = table([cell if bad else mep for bad, mep in zip(few(bad=True, good=False), MEPS, strict=True)])
     with pytest.raises(IsiwError, match=r"row 5 of .* 0 is no MEP, or one below the detection limit"):
-        read_people(table([cell if n == 4 else mep for n, mep in enumerate(MEPS)]), EMPTY_IS_ALONE)
+        read_people(made, EMPTY_IS_ALONE)
+    if cell not in {"<0.2", "no MEP"}:
+        for own, layout in ((made, {"where": {"MEP (mV)": "*"}}), (made.assign(bad=few(bad=1, good=0)), {})):
+            assert sum(trial.told for trial in read_people(own, EMPTY_IS_ALONE.saying(**layout))[0].trials) == sum(KEPT)
 
 
 @pytest.mark.parametrize(("meps", "says"), [(np.minimum(MEPS, 0.8), "saturated"), (np.maximum(MEPS, 0.45), "limit")])
@@ -160,7 +240,12 @@ def test_a_tap_alone_may_be_a_word_among_the_isis_and_a_long_isi_before_the_tap_
 
 def test_units_are_read_below_words_and_in_their_peak_to_peak_spelling(tmp_path: Path) -> None:
     rows = "".join(f"{isi:g};{mep}\n" for isi, mep in zip(ISIS[~ALONE], MEPS[~ALONE], strict=True))
-    for head in ("ISI;MEP\n(ms);amplitude (mV)\n", "ISI (ms);MEP (mVpp)\n", "ISI (ms);MEP (mV p-p)\n"):
+    for head in (
+        "ISI, ms;MEP, mV\n",
+        "ISI;MEP\n(ms);amplitude (mV)\n",
+        "ISI (ms);MEP (mVpp)\n",
+        "ISI (ms);MEP (mV p-p)\n",
+    ):
         (tmp_path / "P01.csv").write_text(head + rows)
         assert [mep for _, mep in trials_of(read_people(tmp_path / "P01.csv", IMPACT))] == MEPS[~ALONE].tolist()
 

@@ -100,6 +100,14 @@ def test_more_remarks_beside_trials_are_asked_about(remark: str) -> None:
     require_as_written(read_people(noted, KNOWN.saying(where=EVERY))[0])
 
 
+@pytest.mark.parametrize("remark", ["no tap", "muscle active", "-> out", "Comment/n. v."])
+def test_remarks_of_what_may_keep_a_trial_from_counting_are_asked_about(remark: str) -> None:
+    noted = with_events(lambda rows: sorted([*rows, (5.4, remark), (5.6, "white noise on"), (7.4, "pause")]))
+    with pytest.raises(IsiwError, match=rf"may say that a trial does not count; got .*{remark}.*--where \"event=\*\""):
+        read_people(noted, KNOWN)
+    require_as_written(read_people(noted, KNOWN.saying(where=EVERY))[0])
+
+
 def test_a_pulse_whose_trigger_is_found_twice_is_one() -> None:
     twice = with_events(lambda rows: sorted([*rows, *((at + 0.001, name) for at, name in rows)]))
     require_as_written(read_people(twice, KNOWN)[0])
@@ -175,7 +183,8 @@ def test_what_matlab_has_beside_sweeps_and_where_these_begin_is_asked_about(tmp_
     with pytest.raises(IsiwError, match=r"come later by as much as their ISIs are longer.*about the pulse"):
         read_people(sweeps(isis_ms), layout)
     for more, says in (({"gain": 1000.0}, r"'gain' of P01\.mat says a factor"), ({"badsweeps": 3}, "not as long"),
-                       ({"note": "EMG rectified"}, "not EMG as it was recorded")):  # fmt: skip
+                       ({"note": "EMG rectified"}, "not EMG as it was recorded"),
+                       ({"remark": np.array(["", "noise", "", "", ""], dtype="O")}, "row 2 .* may say")):  # fmt: skip
         with pytest.raises(IsiwError, match=says):
             read_people(sweeps(**more), layout)
     with pytest.raises(IsiwError, match=r"got 'V in one place|cannot be in|says another unit"):

@@ -27,6 +27,7 @@ _BLANKS: Final = re.compile(r"(?<=\d)[ '’\N{NO-BREAK SPACE}\N{NARROW NO-BREAK 
 _DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")
 _ZONE: Final = re.compile(r":.*(z|utc|gmt|[+-]\d\d:?\d\d)\s*$", re.IGNORECASE)
 _FURTHEST_BEHIND: Final = dt.timedelta(hours=12)  # nowhere on Earth is the time of the day further behind UTC
+_ERROR: Final = re.compile(r"#(N/?[AV]|[^\W_/]+(/0)?[!?])")  # in whatever language
 _REMEDY: Final = "Write dates as 2026-01-31."
 _MANY: Final = 2**16  # so many texts are remembered: in a long table most cells are like others
 
@@ -129,6 +130,12 @@ class Column:
         """The cells of all rows as numbers as they stand there, also with commas, shape (n,); NaN for what is none."""
         texts = pd.Series([text.replace(",", ".") for text in self.texts], dtype=object)
         return pd.to_numeric(texts, errors="coerce").to_numpy(dtype="float64")
+
+    def require_no_errors(self) -> None:
+        """Raise if a cell has an error of Excel."""
+        for row, cell in enumerate(self.cells):
+            if isinstance(cell, str) and cell.startswith("#") and _ERROR.fullmatch(cell.strip()):
+                raise self.refused(row, "is an error of Excel", "Correct its formula, or empty the cell.")
 
     def refused(self, row: int, why: str, remedy: str) -> InvalidValueError:
         """The error that a cell of a row cannot be read."""

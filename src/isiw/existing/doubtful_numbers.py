@@ -12,7 +12,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import LONGEST_ISI_MS
-from isiw.existing.layout import COLUMNS, EMG_UNITS, letters, unit_named
+from isiw.existing.layout import COLUMNS, EMG_UNITS, letters, unit_in
 from isiw.existing.names import ALL, RELATIVE, WHOLE, words_of
 from isiw.findings import AMPLITUDE_MV
 from isiw.types import FloatArray
@@ -31,7 +31,7 @@ _OF_REST: Final = (  # what says of EMG that it is no MEP, or of a number that i
 _WITH, _ITS_HALF, _EXACT = 0.8, 0.7, 0.02  # halves correlate so with amplitudes, and are seldom a larger share of them
 _FEW, _FEWEST = 3, 12  # in a table with fewer rows ISIs may come again by chance
 _LONG_BEFORE_MS: Final = 50.0  # no pulse is given so long before the tap
-_NO_MEP: Final = {"none", "n.d."}  # in an amplitude's place
+_NO_MEP: Final = {"none", "n.d.", "k.a.", "-", "--", "–", "—", ".", "?"}  # in an amplitude's place
 _NEAR_MS, _ALIKE = (1.0, 25.0), 0.98  # so far from each other are ISIs that were asked and measured, and so alike
 
 
@@ -131,8 +131,11 @@ def _require_one_unit(columns: Columns) -> None:
     mep, codes = columns["mep"], {"99", "999", "9999"} if columns["mep"].name not in columns.layout.where else ()
     coded = [row for row in columns.rows if mep.text(row).removesuffix(".0") in codes]
     words = {row: cell.strip() for row in columns.rows if isinstance(cell := mep.cells[row], str)}
-    if said := [row for row, word in words.items() if word.casefold() in _NO_MEP and word != "None"]:
-        raise mep.refused(said[0], "may say that there was no MEP, or that it is not known", mep.remedy)
+    said = [row for row, word in words.items() if word.casefold() in _NO_MEP and word != "None"]
+    said = [row for row in said if columns.lost(row) is None and not columns.tap_alone(row)]
+    if said and mep.name not in columns.layout.where:
+        remedy = f'{mep.remedy} If all such trials are lost, say --where "{mep.name}={ALL}".'
+        raise mep.refused(said[0], "may say that there was no MEP, or that it is not known", remedy)
     if len(coded) >= _FEW and len({mep.text(row) for row in coded}) == 1:
         remedy = f'If it does, leave these cells empty; if not, say --where "{mep.name}={ALL}".'
         raise mep.refused(coded[0], "may stand for no amplitude", remedy)
@@ -177,7 +180,8 @@ def _require_uncut(columns: Columns) -> None:
     times = Counter(number for row in rows if (number := mep.number(row)))
     for odd, is_what in ((max(times, default=0.0), "saturated"), (min(times, default=0.0), "below a limit")):
         usual = max((count for number, count in times.items() if number != odd), default=len(rows))
-        if len(rows) >= _FEWEST and times[odd] >= _FEW * usual and mep.name not in columns.layout.where:
+        apart = times[odd] >= _FEW and odd > 2 * max((number for number in times if number != odd), default=odd)
+        if len(rows) >= _FEWEST and (times[odd] >= _FEW * usual or apart) and mep.name not in columns.layout.where:
             remedy = "Write 0 for an MEP below the limit, and leave the cell of a saturated one empty; if all are as "
             remedy += f'they were measured, say --where "{mep.name}={ALL}".'
             got = f"{times[odd]} times {odd / mep.factor:g}"
@@ -225,7 +229,7 @@ def _halves_beside(columns: Columns) -> dict[str, FloatArray]:
 
 def _has_unit(name: str) -> bool:
     """True if a name has the unit of an amplitude."""
-    return any(unit_named(word) in EMG_UNITS for word in re.findall(r"[^\W_]+", name))
+    return unit_in(name) in EMG_UNITS
 
 
 def _require_one_row_each(columns: Columns) -> None:

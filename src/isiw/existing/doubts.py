@@ -8,7 +8,7 @@ import statistics
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, groupby, pairwise
+from itertools import groupby, pairwise
 from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
@@ -17,11 +17,12 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import Delivered
-from isiw.existing.layout import WORDS, Layout, letters, plain
+from isiw.existing.layout import WORDS, Layout, letters, plain, unit_in
 from isiw.existing.names import (
     ALL,
     MEANS,
     TITLES_OF_MEANS,
+    is_mishap,
     is_verdict,
     key_of_flags,
     require_title,
@@ -30,19 +31,23 @@ from isiw.existing.names import (
 )
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
-from isiw.types import FloatArray
+from isiw.types import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from isiw.existing.quantities import Columns
 
 _INTENSITY: Final = re.compile(r"intensit|stärke\b|\b(mso|r?mt|output|strength|power|[ab][ -]amplitude)\b")
 _NUMBER: Final = re.compile(r"[-.,]*\d[\d.,]*")
-_FEW, _BELOW = 3, 50  # so many rows at most are below the trials
+_FEW, _BELOW_AT_MOST, _BELOW = 3, 20, 50  # so many rows at most are below the trials
 _SEVERAL: Final = 12  # in a table with fewer rows most may be left out
 _CODE: Final = 4  # a shorter text in rows that follow may be initials
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
 _ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
+_LAST: Final = 2000  # so many rows at most are compared with those below them
+_USUAL: Final = 8  # figures are what stands below trials in most files, the first half of these in nearly all
+_CHANCE: Final = 0.02  # with which single trials are hardly by chance what they seem
+_NO_REMARKS: Final = WORDS["alone"] | WORDS["tap alone"] | WORDS["yes"]
 _BELOW_TRIALS: Final = "Delete the rows below the trials; if these are trials, number all in a column called trial."
 _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
@@ -53,6 +58,7 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
     spreads = [name for name in others if says_only(name, WORDS["spreads"])]
     numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in WORDS["numbers"]}
+    averaged = [name for name in numbers if re.search("sweep|averag|mep", letters(name))]
     counted_in = [name for name, texts in numbers.items() if 2 * len({*texts}) <= len(texts)
                   and all(text.isdigit() and int(text) > 1 for text in texts)]  # fmt: skip
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
@@ -70,9 +76,10 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
     if mep.name not in layout.where:
         bare = [row for row, cells in enumerate(zip(mep.texts, isi.texts, strict=True)) if not any(cells)]
         below = [", ".join(cell for cells in others.values() if isinstance(cell := cells[row], str)) for row in bare]
-        require_title("\n".join([heading, *below]), mep, layout.reference)
+        require_title("\n".join([heading, *below]), mep, layout.reference, frame.attrs.get("notes", ""))
     title = TITLES_OF_MEANS.search(words_of(heading)) if once else None
-    if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
+    is_counted = bool(counted_in) and (once or counted_in[0] in averaged)
+    if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or is_counted:
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"
         what += "".join(f" beside {name!r}" for name in beside)
@@ -97,38 +104,88 @@ def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> N
         if (remark := next(filter(is_verdict, remarks), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
+        some = (text for text in {*column.texts} if not _NUMBER.fullmatch(text) and plain(text) not in _NO_REMARKS)
+        mishaps = {*filter(is_mishap, some)}
+        told = [row for row, text in enumerate(column.texts) if text in mishaps]
+        if 0 < _ROWS_A_WORD * len(told) <= len(column.cells) and column.name not in where:
+            remedy = f'Mark such rows in a column called exclude; if they count, say --where "{column.name}={ALL}".'
+            raise column.refused(told[0], "may say why the trial does not count", remedy)
 
 
 def require_no_summaries(columns: Columns, apart: int | None) -> None:
     """Raise if rows from one `apart` on, or with more digits than others, are by their numbers means or SDs."""
-    isi, mep = columns["isi"], columns["mep"]
+    isi, mep, order = columns["isi"], columns["mep"], columns["order"]
     numbers = {row: number for row in columns.rows if (number := mep.number(row)) is not None}
     known, meps = [*numbers], np.array([*numbers.values()]) / mep.factor
     isis = isi.numbers[known]
-    digits = [len(mep.texts[row].partition(mep.decimal)[2]) for row in known]
+    digits = [_digits(mep, row) for row in known]
     below = next((n for n, row in enumerate(known) if apart is not None and row >= apart), len(known))
     for begin in sorted(
         {max(below, len(known) - _BELOW), *range(max(len(known) - _FEW, 0), len(known))} - {len(known)}
     ):
         above, of_isis = meps[:begin], isis[:begin]
         agree = [_is_summary(meps[n], digits[n], above, above[of_isis == isis[n]]) for n in range(begin, len(known))]
-        if len(above) < _FEW or columns["order"].text(known[begin]) or 2 * sum(agree) <= len(agree):
+        if len(above) < _FEW or order.text(known[begin]) or 2 * sum(agree) <= len(agree):
             continue
         finer = digits[begin] > max(digits[:begin]) or np.isclose(isis[begin], np.nanmean(of_isis), rtol=1e-3)
         if below == begin or (finer and agree[0]):
             raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
-    begins = [-1, *(n for n, count in enumerate(digits) if count == max(digits))]
+    unnumbered = [n for n, row in enumerate(known) if not order.text(row) and "order" in columns.of]
+    if (
+        unnumbered
+        and len(known) - unnumbered[0] == len(unnumbered) <= _BELOW_AT_MOST
+        and not np.isfinite(isis[unnumbered]).any()
+    ):
+        why = f"has no ISI, and no number in the column {order.name!r}, as a mean or a sum has"
+        raise mep.refused(known[unnumbered[0]], why, _BELOW_TRIALS)
+    _require_none_below(mep, isi, known[-_LAST:], apart)
+    most = max(digits, default=0)
+    begins = [-1, *(n for n, count in enumerate(digits) if count == most)]
     parts = [(end, meps[begin + 1 : end]) for begin, end in pairwise(begins)]  # each below trials of its own
     if 1 < len(begins) <= len(known) / _ROWS_A_PART and all(_is_summary(meps[n], digits[n], one) for n, one in parts):
         raise mep.refused(known[begins[1]], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
 
 
+def _require_none_below(mep: Column, isi: Column, known: Sequence[int], apart: int | None) -> None:
+    """Raise if the last rows, which have no ISI, are too well figures of all above, of pairs, or of TMS alone."""
+    meps, isis, digits = mep.numbers[known], isi.numbers[known], [_digits(mep, row) for row in known]
+    paired, slacks = np.isfinite(isis), np.maximum(0.51 * 10.0 ** -np.array(digits, dtype=float), 1e-9 * meps)
+    first = int(np.flatnonzero(paired).max(initial=-1)) + 1
+    for begin in range(max(first, len(meps) - _BELOW_AT_MOST, _SEVERAL), len(meps)):
+        above = meps[:begin]
+        kinds = [_figures(one) for one in (above, above[paired[:begin]], above[~paired[:begin]])]
+        of_each = [float(above[isis[:begin] == isi].mean()) for isi in np.unique(isis[paired])[:_BELOW_AT_MOST]]
+        usual, every = (np.concatenate([one[:most] for one in kinds]) for most in (_USUAL, None))
+        for figures in (usual[: _USUAL // 2], usual, every, np.array(of_each)):
+            are_so = np.any(abs(figures[:, None] - meps) <= slacks, axis=0)
+            by_chance = max(are_so[:begin].sum() - 2, 0.5) / begin  # two are the least and the largest
+            chance = float(np.prod(np.where(meps[begin:] > 2 * above.max(), _CHANCE, by_chance)))
+            if are_so[begin:].all() and chance * (_CHANCE if apart == known[begin] else 1.0) < _CHANCE:
+                raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
+
+
+def _digits(column: Column, row: int) -> int:
+    return len(column.texts[row].partition(column.decimal)[2])
+
+
 def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
     """True if a number is, as far as its digits say, a mean or median of others, their SD, or its standard error."""
-    slack, of = max(0.51 * 10.0**-digits, 1e-9 * abs(number)), [group for group in groups if len(group) > 1]
-    sds = [(sd := float(np.std(group, ddof=one)), sd / len(group) ** 0.5) for group in of for one in (0, 1)]
-    means = [each for group in of for each in (np.mean(group), np.median(group))]
-    return number not in groups[0] and any(abs(each - number) <= slack for each in (*means, *chain(*sds)))
+    slack = max(0.51 * 10.0**-digits, 1e-9 * abs(number))
+    return number not in groups[0] and any((abs(_figures(one)[:_USUAL] - number) <= slack).any() for one in groups)
+
+
+def _figures(values: FloatArray) -> FloatArray:
+    """What stands below numbers, the most usual first: mean, SD, the least and the largest."""
+    if len(values) < 2:
+        return np.empty(0)
+    mean, sds = float(np.mean(values)), np.array([np.std(values, ddof=one) for one in (0, 1)])
+    geometric = np.exp(np.log(values[values > 0]).mean()) if (values > 0).any() else 0.0
+    quarters = [*np.quantile(values, [0.25, 0.75]), *statistics.quantiles(values.tolist())[::2]]
+    cvs = sds / mean if mean else sds
+    usual = [mean, sds[1], values.min(), values.max(), np.median(values), sds[0], *(sds / len(values) ** 0.5)]
+    return np.array(
+        [*usual, *quarters, np.ptp(values), values.sum(), len(values), *sds**2, *cvs, *(100 * cvs), geometric]
+    )
 
 
 def require_short(delivered: Delivered, layout: Layout) -> None:
@@ -155,7 +212,7 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 
 def require_one_kind_each(columns: Columns) -> None:
     """Raise if rows are not of one person's single trials of one muscle, in their order and in one unit."""
-    for doubt in (_require_ascending, require_said, _require_one_kind, _require_one_intensity):
+    for doubt in (_require_ascending, _require_said, _require_one_kind, _require_one_intensity):
         doubt(columns)
 
 
@@ -215,7 +272,7 @@ def _require_ascending(columns: Columns) -> None:
         raise InvalidValueError(what, got=f"{twice[0]:g}", remedy=remedy)
 
 
-def require_said(columns: Columns) -> None:
+def _require_said(columns: Columns) -> None:
     """Raise if it is not stated what rows without an ISI are, or if a row is both a pair and TMS alone."""
     isi, condition, paired = columns["isi"], columns["condition"], columns.paired
     one_word = len({*map(plain, map(condition.text, columns.rows))}) == 1  # in all rows it means nothing
@@ -261,20 +318,33 @@ def _require_one_kind(columns: Columns) -> None:
         if alone and len({*texts.values()}) > 1:
             remedy = f'Say --column "condition={name}"; if these are pairs, say --where "{name}={ALL}".'
             raise column.refused(alone[0], "says TMS alone, and nothing is read of it", remedy)
-        if {*texts.values()} <= {"", *WORDS["yes"], *WORDS["no"]} and _are_flags(texts, by_isi):
+        said = np.array([texts[row] in WORDS["yes"] for _, row in by_isi])
+        if {*texts.values()} <= {"", *WORDS["yes"], *WORDS["no"]} and _are_flags(said, by_isi):
             remedy = f'If yes leaves a trial out, say --column "exclude={name}"; if no does, --column "status={name}"; '
             remedy += f'if all are to be analysed together, --where "{name}={ALL}".'
             raise column.doubted("says yes or no of each pair, and nothing is read of it", None, remedy)
         if kinds := kinds_at_each(by_isi, column):
             few = ", ".join(kinds[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
             remedy = f'Say --where "{name}={kinds[0]}" for one of them, --where "{name}={ALL}" if all are to '
-            remedy += f'be analysed together, or --column "subject={name}" if they are people.'
+            remedy += f'be analysed together, or --column "subject={name}" if they are people; if one is TMS alone, '
+            remedy += "write that in place of its ISIs."
             raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
 
 
-def _are_flags(texts: Mapping[int, str], by_isi: Sequence[tuple[float, int]]) -> bool:
+def _seldom_states(by_isi: Sequence[tuple[float, int]], column: Column) -> list[str]:
+    """Two or three numbers, or words of all, of which one is seldom, and not of a range of ISIs, as a state may be."""
+    texts = [column.text(row) for _, row in by_isi]
+    times = Counter(filter(None, texts))
+    are_states = all(texts) or all(re.fullmatch(r"\d", text) for text in times)
+    if len(times) not in {2, 3} or not are_states or min(times.values()) < _FEW:
+        return []
+    said = np.array(texts) == min(times, key=lambda text: times[text])
+    has_isis = np.unique(np.array([isi_ms for isi_ms, _ in by_isi])[said]).size > 1  # or else it stands for one
+    return [*times] if has_isis and _are_flags(said, by_isi) and not _counts_again(column, by_isi) else []
+
+
+def _are_flags(said: BoolArray, by_isi: Sequence[tuple[float, int]]) -> bool:
     """True if yes and no are not of a range of several ISIs, as of those with a response."""
-    said = np.array([texts[row] in WORDS["yes"] for _, row in by_isi])
     if said.all() or not said.any():
         return False
     isis_ms = np.array([isi_ms for isi_ms, _ in by_isi])
@@ -290,15 +360,16 @@ def kinds_at_each(by_isi: Sequence[tuple[float, int]], column: Column) -> list[s
     are_words = not any(map(_NUMBER.fullmatch, texts))
     kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
     if len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
-        return []
-    if not are_words and (len(kinds) > len(by_isi) / _ROWS_A_NUMBER or _counts_again(column, by_isi)):
+        return _seldom_states(by_isi, column)
+    is_measure = len(kinds) > _FEW and (unit_in(column.name) or not all(map(str.isdigit, kinds)))
+    if not are_words and (is_measure or len(kinds) > len(by_isi) / _ROWS_A_NUMBER or _counts_again(column, by_isi)):
         return []
     usual = min(kinds.values()) if are_words else len(texts) / len(kinds)
     size = min(math.ceil(4 * len(texts) / usual), len(texts) // 2)
     bins = [texts[first : first + size] for first in range(0, len(texts) - size + 1, size)]
     shares = [len(kinds.keys() & {*each}) / len(kinds) for each in bins]
     several = sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins)
-    return [*kinds] if several else []
+    return [*kinds] if several else _seldom_states(by_isi, column)
 
 
 def _counts_again(column: Column, by_isi: Sequence[tuple[float, int]]) -> bool:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from itertools import chain, islice, pairwise, zip_longest
 from pathlib import Path
@@ -17,9 +16,9 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, Layout, letters, unit_named
-from isiw.existing.names import doubtful_words, is_verdict, key_of_flags, words_of
+from isiw.existing.names import doubtful_words, is_verdict
 from isiw.existing.quantities import require_one, unit_said
-from isiw.lazy import pd, scipy
+from isiw.lazy import pd
 from isiw.opening import opened
 from isiw.text.named_code import library
 from isiw.text.sanitize import counted
@@ -31,9 +30,7 @@ _NOTE: Final = re.compile(rb'(?s)<comment ref="[A-Z]+(\d+)"(.*?)</comment>')
 _TEXT: Final = re.compile(r"(?s)<t(?: [^>]*)?>([^<]*)</t>")
 _LINES, _HEAD = 100, 40  # within so many lines the columns' names are sought; so many bytes show how a text is encoded
 _BLANKS: Final = r"\s+"
-_OF_TRIALS: Final = re.compile(
-    r"^(?!n\b|num|count).*(trial|sweep|frame|idx|ind(ex|ices))"
-)  # a number that may be one's own
+_WORDS: Final = 2  # blanks at least are in a line of text
 _COUNT: Final = "If these trials count, show them as the others; if not, mark them in a column called exclude."
 _SHOWN_OTHERWISE: Final = (
     (r'<row (?=[^>/]*hidden="(?:1|true)")[^>/]*?r="(\d+)"[^>/]*>', "hidden", _COUNT),
@@ -45,16 +42,15 @@ _SHOWN_OTHERWISE: Final = (
 def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
     """The table in a file, its cells as they are."""
     suffix = path.suffix.lower()
-    if suffix == ".mat":
-        return of_vectors(read_arrays(path), layout)
     if suffix in STATISTICS:
         return _labelled(path, STATISTICS[suffix])
     if suffix == ".parquet":
-        return named(pd.read_parquet(io.BytesIO(_content(path))))
-    return _workbook(_content(path), layout) if suffix in WORKBOOKS else _texts(text_of_file(path), layout)
+        return named(pd.read_parquet(io.BytesIO(content_of(path))))
+    return _workbook(content_of(path), layout) if suffix in WORKBOOKS else _texts(text_of_file(path), layout)
 
 
-def _content(path: Path) -> bytes:
+def content_of(path: Path) -> bytes:
+    """The bytes in a file."""
     with opened(path) as file:
         return file.read()
 
@@ -95,12 +91,13 @@ def _texts(text: str, layout: Layout) -> pd.DataFrame:
     lines = every[layout.skip_lines :]
     first = 0 if layout.names else _first(lines, layout)
     title, lines = "".join(lines[:first]), lines[first:]
-    separator = layout.separator or _separator(lines[0].lstrip("# ") if lines else "")
+    separator = layout.separator or _separator(lines)
     if lines and lines[0].startswith("#"):
         lines = [*_first_part(lines, separator)]
     title += "".join(line for line in lines if line.startswith("# "))
     lines = [line for line in lines if not line.startswith("# ")]
-    every_row = [*_split(lines, separator)]
+    every_row, foot = _without_foot([*_split(lines, separator)])
+    title += foot
     table = _table([row for row in every_row if row], layout, title)
     below = len(every_row) - next((n for n in range(len(every_row), 1, -1) if not every_row[n - 1]), 0)
     table.attrs["apart"] = len(table) - below if below < len(table) else None
@@ -126,7 +123,7 @@ def _first(lines: Sequence[str], layout: Layout) -> int:
     """The line with the columns' names: those below it have as many cells, or at least it has a sign between names."""
     found = []
     for number, line in enumerate(lines[:_LINES]):
-        separator = layout.separator or _separator(line.lstrip("# "))
+        separator = layout.separator or _separator(lines[number : number + 2])
         names, *below = _split([line.lstrip("# "), *lines[number + 1 : number + 3]], separator)
         if _is_header(names, layout):
             found.append((not all(len(row) >= len(names) for row in below if row), separator == _BLANKS, number))
@@ -172,6 +169,24 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
     return table
 
 
+def _text_in(rows: Iterable[Sequence[Any]]) -> str:
+    return "\n".join(" ".join(str(cell) for cell in row if not is_missing(cell)) for row in rows)
+
+
+def _without_foot(rows: list[list[Any]]) -> tuple[list[list[Any]], str]:
+    """Rows without lines of text below them, and these lines."""
+    kept, foot = len(rows), ""
+    for row in reversed(rows):
+        if len(said := [cell for cell in row if not is_missing(cell)]) > 1 or not all(map(_is_line, said)):
+            break
+        kept, foot = kept - 1, "\n".join([*said, foot])
+    return (rows[:kept], f"\n{foot}") if foot.strip() else (rows, "")
+
+
+def _is_line(cell: Any) -> bool:
+    return isinstance(cell, str) and (cell.count(" ") >= _WORDS or ": " in cell)
+
+
 def _unit_below(cell: str) -> str | None:
     """What a cell below a name adds to it: a unit, or words with a unit behind them, such as amplitude (mV)."""
     if unit := unit_named(cell.strip().strip("[]()")):
@@ -182,7 +197,7 @@ def _unit_below(cell: str) -> str | None:
 
 def text_of_file(path: Path) -> str:
     """The text in a file."""
-    return decoded(_content(path))
+    return decoded(content_of(path))
 
 
 def decoded(content: bytes) -> str:
@@ -197,9 +212,11 @@ def decoded(content: bytes) -> str:
     return content.decode("cp1252", errors="replace")
 
 
-def _separator(line: str) -> str:
-    counts = {sign: line.count(sign) for sign in ("\t", ";", ",", "|")}
-    best = max(counts, key=lambda sign: counts[sign])
+def _separator(lines: Sequence[str]) -> str:
+    """The sign between names that comes as often in the line below, or else most often."""
+    line, below = ([one.lstrip("# ") for one in lines[:2]] + ["", ""])[:2]
+    counts = {sign: line.count(sign) for sign in ("\t", ";", "|", ",")}
+    best = max(counts, key=lambda sign: (0 < counts[sign] == below.count(sign), counts[sign]))
     return best if counts[best] else _BLANKS
 
 
@@ -220,13 +237,12 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
     sheets, heads, titles = dict[str, list[list[Any]]](), dict[str, int](), dict[str, str]()
     for name in [layout.sheet] if layout.sheet is not None else map(str, book.sheet_names):
-        cells = book.parse(name, header=None, dtype=object, keep_default_na=False).to_numpy().tolist()
+        cells, foot = _without_foot(_cells(book.book[name]))
         rows = cells[layout.skip_lines :]
         first = next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0)
         sheets[name] = rows if layout.names else rows[first:]
         heads[name] = len(cells) - len(sheets[name]) + (0 if layout.names else 1)
-        above = chain.from_iterable(cells[: max(heads[name] - 1, 0)])
-        titles[name] = "\n".join([name, *(cell for cell in above if isinstance(cell, str))])
+        titles[name] = f"{name}\n{_text_in(cells[: max(heads[name] - 1, 0)])}{foot}"
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
     if len(with_trials) > 1:
         what = "several sheets of the workbook hold trials"
@@ -249,7 +265,16 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
             pairs = zip_longest(rows[0], shown[: len(rows[0])])
             rows[0] = [f"{name} ({unit})" if unit else name for name, unit in pairs]
             break
-    return _table(rows, layout, titles[chosen])
+    table = _table(rows, layout, titles[chosen])
+    table.attrs["notes"] = "\n".join(f"{titles[name]}\n{_text_in(sheets[name])}" for name in sheets if name != chosen)
+    return table
+
+
+def _cells(sheet: Any) -> list[list[Any]]:
+    """The rows of a sheet up to the last that is filled, an error such as #DIV/0! as its text."""
+    frame = pd.DataFrame([*sheet.iter_rows(values_only=True)], dtype=object)
+    rows, columns = (int(np.flatnonzero(frame.notna().any(axis=axis)).max(initial=-1)) + 1 for axis in (1, 0))
+    return frame.iloc[:rows, :columns].to_numpy().tolist()
 
 
 def _flag_coloured(rows: list[list[Any]], coloured: Iterable[int]) -> None:
@@ -327,58 +352,3 @@ def _shown_in(number_format: str) -> str:
         return f"÷{1000 ** len(commas[1])}"
     words = [word.strip() for word in re.findall(r'"([^"]*)"', number_format)]
     return "%" if "%" in number_format else next((word for word in words if unit_named(word)), "")
-
-
-def read_arrays(path: Path) -> dict[str, Any]:
-    """The arrays in a file of MATLAB by name, those in structures among them."""
-    content = _content(path)
-    if content.startswith(b"MATLAB 7.3"):
-        values = library("pymatreader", "import").read_mat(str(path))
-    else:
-        values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
-    if {"data", "datastart", "dataend", "titles"} <= values.keys():
-        remedy = "In LabChart: File, Export, LabChart text (.txt), and a layout: docs/your-data.md."
-        raise InvalidValueError("this has LabChart's channels one behind the other", got="data", remedy=remedy)
-    paths = dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
-    last = Counter(path[-1] for path in paths)
-    return {path[-1] if last[path[-1]] == 1 else ".".join(path): array for path, array in paths.items()}
-
-
-def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """The arrays in structures by their path; of a structure for each trial, the values of each of its fields."""
-    for name, value in values.items():
-        each = list(value) if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim == 1) else []
-        inner = value if isinstance(value, dict) else {}
-        if each and all(isinstance(one, dict) for one in each):
-            held = {key: [one.get(key, np.nan) for one in each] for key in each[0]}
-            inner = {key: [one if np.size(one) else np.nan for one in values] for key, values in held.items()}
-        yield from (((name, *path), array) for path, array in _flat(inner))
-        if not inner:
-            yield (name,), np.asarray(value)
-
-
-def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
-    """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
-    squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
-    vectors = {name: array for name, array in squeezed.items()  # but not a cell's arrays, such as one for each ISI
-               if array.ndim == 1 and not any(isinstance(one, np.ndarray) for one in array)}  # fmt: skip
-    texts = {name: str(array.item()) for name, array in arrays.items() if array.size == 1 and array.dtype.kind in "UO"}
-    of_isis = {name for name in vectors if name == layout.columns.get("isi") or letters(name) in COLUMNS["isi"]}
-    longest = max((len(vectors[name]) for name in of_isis or vectors), default=0)
-    if longest == 0:
-        what = "the file has no vectors that could be the columns of a table"
-        remedy = "Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
-        raise InvalidValueError(what, got=", ".join(arrays) or "nothing that can be read", remedy=remedy)
-    alone = {
-        name: array.ravel() for name, array in arrays.items() if array.size == 1 and _OF_TRIALS.search(words_of(name))
-    }
-    for name, vector in {**vectors, **alone}.items():
-        is_longer = np.any(vector > (name not in alone)) if vector.dtype.kind in "iuf" else False
-        if len(vector) != longest and is_longer and key_of_flags(name):
-            what = f"the vector {name!r} is not as long as that of the ISIs, as if it had the numbers of some trials"
-            remedy = "Save one in its place that has for each trial 1 if it does not count, and 0 if it does: exclude."
-            raise InvalidValueError(what, got=vector.tolist()[:5], remedy=remedy)
-    units = {name: text for name, text in texts.items() if letters(name).endswith(("unit", "units"))}
-    table = pd.DataFrame({**{name: vector for name, vector in vectors.items() if len(vector) == longest}, **units})
-    table.attrs["title"] = "\n".join(text for name, text in texts.items() if name not in units)
-    return table

@@ -56,6 +56,11 @@ def unit_named(word: object) -> str | None:
     return UNIT_WORDS.get(str(word).strip().casefold())
 
 
+def unit_in(name: str) -> str | None:
+    """The first unit among the words of a name."""
+    return next(filter(None, map(unit_named, re.findall(r"[^\W_]+", name))), None)
+
+
 @dataclass(frozen=True)
 class Layout(Checked):
     """The layout of a file; what is not stated is found, or asked for.

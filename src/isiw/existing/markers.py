@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -15,7 +16,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, says_alone
 from isiw.existing.doubts import kinds_at_each
 from isiw.existing.layout import ISI_UNITS_MS, MARKS, Layout, plain
-from isiw.existing.names import ALL, is_verdict
+from isiw.existing.names import ALL, is_mishap, is_verdict
 from isiw.existing.quantities import isis_of, require_one
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
@@ -23,6 +24,7 @@ from isiw.types import FloatArray
 
 _TWICE_S: Final = 3e-3  # a trigger that is found twice within so short a time is one, which came at the first edge
 _SAME_PULSE_S: Final = 20e-3  # an event of a pulse alone marks the pulse that is marked within so short a time
+_SELDOM: Final = 4  # so many times more pulses are there than remarks of one text
 _FEW: Final = 3  # so many pulses after an event, at different times, are hardly by chance
 EVENT: Final = "event"  # what `where` calls the events of which nothing else is read
 _NONE: Final = "no event"
@@ -151,13 +153,16 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
 
 def _require_no_verdicts(events: pd.DataFrame, at_s: FloatArray, layout: Layout, source: str) -> None:
     """Raise if a remark beside a trial says that it does not count; one that begins with BAD may span it."""
-    odd = [name for name in names_of(events) if is_verdict(name) and EVENT not in layout.where]
+    others, times = _others(events, layout), Counter(events["name"].astype(str))
+    seldom = [name for name in others if _SELDOM * times[name] <= len(at_s)]
+    odd = [name for name in names_of(events) if is_verdict(name) or (name in seldom and is_mishap(name))]
+    odd = odd if EVENT not in layout.where else []
     for name, onset_s, lasts_s in events[["name", "onset", "duration"]].itertuples(index=False):
         is_bad = re.match("(?i)bad", name) and (lasts_s > 0 or np.any(np.abs(at_s - onset_s) < _EARLY_S))
         if name in odd and not is_bad and "boundary" not in name.casefold():
-            what = f"an event of {source} says that a trial does not count, and lies beside it"
-            remedy = "Mark the trial itself by an annotation whose name begins with BAD, or remove its pulse; if all "
-            remedy += f'are to be analysed, say --where "{EVENT}={ALL}".'
+            what = f"an event of {source} {'says' if is_verdict(name) else 'may say'} that a trial does not count"
+            remedy = "Mark the trial itself by an annotation whose name begins with BAD, or remove its pulse; or say "
+            remedy += f'what it marks, such as --marker "alone={name}"; if all count, say --where "{EVENT}={ALL}".'
             raise InvalidValueError(what, got=f"{name!r} at {onset_s:.3f} s", remedy=remedy)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from typing import TYPE_CHECKING, Final
 
@@ -44,7 +45,11 @@ _MEASURES: Final = (
     r"\b[mµμu]?v([²/]| ?[*·×] ?m?s\b|m?s\b)"
 )
 _ENDS: Final = rf"^(?!.*({WHOLE})).*\b(trough|max|maximum|min|minimum)\b"
-_GAIN: Final = r"\bgain\b|amplified|verstärk"
+_GAIN: Final = r"\bgain(?![^\W\d])|amplifi(ed|cation)|verstärk"
+_A_GAIN: Final = re.compile(
+    rf"({_GAIN})\w*\W*((factor|of|by|x|=)\W*)*(?!1(\.0*)?\b)\d+|\b\d+ ?(x|fold|fach|times)\w* ({_GAIN})"
+)  # with a number that is not 1
+_AT_ELECTRODES: Final = re.compile("at the electrode|an den elektroden|corrected|referred|rückgerechnet|korrigiert")
 _POWER: Final = r"10 ?[\^⁺⁻⁰¹²³⁴-⁹]"
 _FACTOR: Final = (
     rf"{_POWER}|[×*·/÷] ?\d|(?<![a-z])x ?\d|\b\d+ ?([×*·]|x\b)|(\b|\d)e ?[-+]\d|"
@@ -81,8 +86,8 @@ _ANY_TITLES: Final = {
     rf"(%|per ?cent|prozent|pour ?cent|por ?ciento) (of|vom|von|der|de|du|del|van) ?(the )?{_BASES}|"
     r"\bnormali[sz]ed\b|\bnormiert|\bmeps? ?/": "to be relative",
     r"\b(averages?|averaged|means?|mittel\w*|gemittelt|moyennes?) (of|over|across|von|aus|über|de) "
-    r"(\d+|two|three|four|five|six|eight|ten|several) "
-    r"(meps|sweeps|trials|pulses|stimuli|responses)": "to be means of several trials",
+    r"(\d+|two|three|four|five|six|eight|ten|several) (meps|sweeps|trials|pulses|stimuli|responses)|"
+    r"\b(meps|sweeps|trials|frames|pulses) (averaged|gemittelt)\W*(?!1\b)\d": "to be means of several trials",
 }  # what a title says in whatever clause
 _TITLES: Final = {
     r"%|per ?cent|prozent|pour ?cent|por ?ciento|\bz-? ?scor|\blog\w*[- ](transf|of|mep|amp)|\blogarithm|\bratios?\b|"
@@ -101,6 +106,9 @@ _LISTED: Final = re.compile(
     rf"\b{_LEFT_OUT}\b\W*((in|of|trials?|sweeps?|frames?|stimul\w+|nr|no|versuche?|essais?)\b\W*)*{_NUMBER}|"
     rf"\b(trials?|sweeps?|versuche?|nr|essais?)\W+{_NUMBER}(\W+(and |und |et )?\d+)*\W+(\w+\W+){{0,2}}{_LEFT_OUT}\b"
 )  # numbers of trials that do not count
+_OF_GAIN: Final = 'Divide the amplitudes by it; if they are those at the electrodes already, say --where "{}=*".'
+_MISHAPS: Final = re.compile("|".join(WORDS["mishaps"]))
+_LACKS: Final = re.compile("|".join(WORDS["lacks"]))
 _CLAUSES: Final = re.compile(r"[\n;]|[.,](?=\s)")
 _WORDS: Final = 4  # in a longer remark bad may be of something
 
@@ -145,14 +153,19 @@ def require_order(isi: Column) -> None:
             raise isi.doubted(says, found[0], remedy)
 
 
-def require_title(title: str, mep: Column, reference: Reference | None) -> None:
-    """Raise if a title, or what stands below the trials, says what amplitudes or ISIs are, or which do not count."""
+def require_title(title: str, mep: Column, reference: Reference | None, notes: str = "") -> None:
+    """Raise if a title, or what stands below the trials, says what amplitudes or ISIs are, or which do not count.
+
+    Of notes elsewhere, as on other sheets, it must say nothing of trials that do not count, and no gain.
+    """
     remedy = f'If not, correct the title, or the name of the file or sheet, or say --where "{mep.name}={ALL}".'
-    said = words_of(title)
-    if (found := _LISTED.search(" ".join(said.split()))) is not None:
+    said, every = words_of(title), words_of(f"{title}\n{notes}")
+    if (found := _LISTED.search(" ".join(every.split()))) is not None:
         what = f"a line of {mep.of} beside the table says which trials do not count"
         left_out = "Mark them in a column called exclude, and remove that line; if they are left out already, say "
         raise InvalidValueError(what, got=found[0], remedy=f'{left_out}--where "{mep.name}={ALL}".')
+    if (found := _A_GAIN.search(every)) is not None and not _AT_ELECTRODES.search(every):
+        raise mep.doubted("stands below a title that says a gain", found[0], _OF_GAIN.format(mep.name))
     for clause in (" ".join(each.split()) for each in _CLAUSES.split(said)):
         origin = rf"{_AFTER} (the )?(\w+ ){{0,2}}?({_ORIGINS[reference]})" if reference is not None else "(?!)"
         if found := re.search(origin, clause):
@@ -162,6 +175,14 @@ def require_title(title: str, mep: Column, reference: Reference | None) -> None:
         for pattern, seems in (_ANY_TITLES | (_TITLES if is_of_meps else {})).items():
             if found := re.search(pattern, clause):
                 raise mep.doubted(f"seems {seems} by what the title says", found[0], remedy)
+
+
+def require_no_gain(columns: Iterable[Column], where: Mapping[str, str]) -> None:
+    """Raise if a column of which nothing is read has an amplifier's gain."""
+    for column in columns:
+        odd = [text for text in column.texts if text not in {"", "0", "1"}]
+        if odd and column.name not in where and re.search(_GAIN, words_of(column.name)):
+            raise column.doubted("has a gain, and nothing is read of it", odd[0], _OF_GAIN.format(column.name))
 
 
 def says_only(text: str, known: AbstractSet[str]) -> bool:
@@ -190,3 +211,10 @@ def is_verdict(text: str) -> bool:
         return True  # such as "not valid"
     is_said = bool(phrases) or not words.isdisjoint(known)
     return said in known or (is_said and words.isdisjoint(WORDS["no"]))
+
+
+def is_mishap(text: str) -> bool:
+    """True if a remark says what may keep a trial from counting, such as noise, a movement, or that no tap came."""
+    said = " ".join(text.casefold().split())
+    is_denied = not WORDS["no"].isdisjoint(re.findall(r"\w\w+", said))
+    return bool(_LACKS.search(said) or (_MISHAPS.search(said) and not is_denied))

@@ -12,7 +12,15 @@ from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing import doubts
 from isiw.existing.cells import Column, is_missing, required_unit, says_alone, with_decimals, without_unit_in_cells
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, WORDS, Layout, letters, plain, unit_named
-from isiw.existing.names import ALL, RELATIVE, require_of_kind, require_order, require_reference, words_of
+from isiw.existing.names import (
+    ALL,
+    RELATIVE,
+    require_no_gain,
+    require_of_kind,
+    require_order,
+    require_reference,
+    words_of,
+)
 from isiw.findings import Kind
 from isiw.lazy import pd
 
@@ -94,6 +102,7 @@ class Columns:
                 units = units_beside(key, name, frame) or _units_above(key, name, frame)
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
+                columns[key].require_no_errors()
                 of_units |= units.keys()
         columns, stated = _scaled(columns, layout)
         columns |= _with_taps_alone(replace(columns["isi"], remedy=_OF_ISIS), columns.get("tap_alone"))
@@ -115,6 +124,7 @@ class Columns:
                   if name in names or not all(map(is_missing, cells))}  # fmt: skip
         doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})],
                                    layout.where)  # fmt: skip
+        require_no_gain(beside.values(), layout.where)
         require_reference("column", "isi", columns["isi"].name, layout.reference, source)
         if columns["isi"].name not in layout.where:
             require_order(columns["isi"])

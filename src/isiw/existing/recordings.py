@@ -15,7 +15,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing, required_unit
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubtful_numbers import require_plain_isis
-from isiw.existing.doubts import is_rectified, require_said
+from isiw.existing.doubts import is_rectified, require_one_kind_each
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
@@ -35,6 +35,7 @@ from isiw.types import FloatArray
 
 _BEFORE_S, _AFTER_S = 0.15, 0.1  # of a continuous recording, before the longest ISI and after the pulse
 _APART_MS: Final = 2.0  # an ISI in a table that differs by more from that of the events is another one
+_QUIET_UV: Final = 0.03  # no electrode has less noise [RMS]
 _SLOW_HZ: Final = 1000.0  # a trigger with fewer samples a second is said
 _LATEST_MS, _SPREAD_MS = 60.0, 5.0  # a response is not later; ISIs that are nearer to each other tell nothing
 _SLOPE, _FITS = 0.2, 0.9  # so near to 1 is the slope of responses by ISIs if they follow the tap
@@ -91,6 +92,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         got = ", ".join(sorted({str(trial.reason) for trial in trials if trial.reason})) or "excluded ones"
         remedy = " ".join([*contents.notes, _IF_NONE_COUNTS.format(limits.background_uv)])
         raise InvalidValueError(f"no sweep of {source} counts", got=got, remedy=remedy)
+    _require_noise(trials, signals["emg"].name, contents, layout)
     if layout.mep_window_ms is None and any(trial.isi_ms is not None for trial in trials):
         _require_within(seen, limits, source)
     apart = ((one.channels["emg"].values, _since_pulse_ms(one)) for one, _ in seen)  # from the artefact of the pulse
@@ -107,6 +109,16 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         unused=unused,
         notes=(*contents.notes, *is_rectified(emg)),
     )
+
+
+def _require_noise(trials: Sequence[Trial], emg: str, contents: Contents, layout: Layout) -> None:
+    """Raise if EMG whose unit nothing says has less noise than an amplifier in the usual one."""
+    rests_uv = [trial.background_rms_uv or np.inf for trial in trials]
+    rest_uv = float(np.median(rests_uv)) if rests_uv else np.inf
+    if contents.unit_is_usual and layout.unit_of(EMG_UNITS) is None and rest_uv < _QUIET_UV and emg not in layout.where:
+        what = f"the EMG of {contents.source} has less noise at rest than any amplifier, in µV as is usual"
+        remedy = f'Say --unit mV or --unit V; if it is in µV, say --unit uV, or --where "{emg}={ALL}".'
+        raise InvalidValueError(what, got=f"{rest_uv:.2g} µV RMS", remedy=remedy)
 
 
 def _require_within(seen: Sequence[tuple[Sweep, Trial]], limits: SignalLimits, source: str) -> None:
@@ -246,7 +258,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
         what = f"{contents.source} does not say the ISI of each sweep"
         raise InvalidValueError(what, got=f"{len(trials)} rows and {len(emg.stretches)} sweeps")
     columns = Columns.found(trials, stated, contents.source, needed=("isi",))
-    require_said(columns)
+    require_one_kind_each(columns)
     require_plain_isis(columns)
     marks = {key: marked(contents.events, key, layout) for key in (origin_key(layout), "pulse", "alone")}
     pulses = list[Pulse]()

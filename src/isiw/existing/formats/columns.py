@@ -28,7 +28,11 @@ _OF_LAYOUT: Final = "Correct rate_hz in the layout; what has another rate must b
 
 def read(path: Path, layout: Layout) -> Contents:
     """A table, or the channels and events of a recording whose layout names the column of the EMG."""
-    frame, source = frames.read_frame(path, layout), path.name
+    return of_frame(frames.read_frame(path, layout), path.name, layout)
+
+
+def of_frame(frame: pd.DataFrame, source: str, layout: Layout) -> Contents:
+    """The same of a table that was read."""
     if "emg" not in layout.channels:
         return Contents(source, trials=frame)
     rate_hz, head = required(layout, "rate_hz", f"the sampling rate of {source}"), frame.attrs.get("head", "")
@@ -62,7 +66,7 @@ def read(path: Path, layout: Layout) -> Contents:
 
 def of_emg(text: str) -> str:
     """The lines of a text that are of EMG."""
-    return "\n".join(line for line in text.splitlines() if re.search(r"(?i)\bemg\b", line))
+    return "\n".join(line for line in text.splitlines() if re.search(r"(?i)\bemg\b|amplifier|verstärk|^\W*gain", line))
 
 
 def required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, cast
 
 import numpy as np
 
@@ -14,18 +16,23 @@ from isiw.errors import InvalidValueError
 from isiw.existing import frames, quantities
 from isiw.existing.formats import columns
 from isiw.existing.formats.contents import Contents, Track, parted
-from isiw.existing.layout import WORDS, Layout, letters
-from isiw.existing.names import ALL
-from isiw.lazy import pd
+from isiw.existing.layout import COLUMNS, WORDS, Layout, letters
+from isiw.existing.names import ALL, key_of_flags, words_of
+from isiw.lazy import pd, scipy
+from isiw.text.named_code import library
+
+_OF_TRIALS: Final = re.compile(
+    r"^(?!n\b|num|count).*(trial|sweep|frame|idx|ind(ex|ices))"
+)  # a number that may be one's own
 
 
 def read(path: Path, layout: Layout) -> Contents:
     """A table of vectors, a recording in vectors, or sweeps beside a vector of their ISIs."""
-    source, name, arrays = path.name, layout.channels.get("emg"), frames.read_arrays(path)
+    source, name, arrays = path.name, layout.channels.get("emg"), _arrays(path)
     numbers = {other: array.item() for other, array in arrays.items() if array.size == 1 and array.dtype.kind in "fiu"}
     _require_no_factor(arrays, numbers, layout, source)
     if name is None:
-        return columns.read(path, layout)
+        return columns.of_frame(_vectors(arrays, layout), source, layout)
     quantities.require_one("array", source, name, arrays)
     rate_hz = columns.required(layout, "rate_hz", f"the sampling rate of {source}")
     for other, number in numbers.items():
@@ -34,9 +41,9 @@ def read(path: Path, layout: Layout) -> Contents:
         elif number > 0 and word in WORDS["periods"]:
             columns.require_period(rate_hz, number, None, f"{other!r} of {source}")
     if arrays[name].squeeze().ndim < 2:
-        return columns.read(path, layout)
+        return columns.of_frame(_vectors(arrays, layout), source, layout)
     pulse_at_ms = columns.required(layout, "pulse_at_ms", f"the time of the pulse in a sweep of {source}")
-    beside, sweeps = frames.of_vectors(arrays, layout), np.asarray(arrays[name], dtype=np.float64)
+    beside, sweeps = _vectors(arrays, layout), np.asarray(arrays[name], dtype=np.float64)
     if sweeps.ndim != 2 or (count := len(beside)) not in sweeps.shape:
         what = f"the sweeps of {source} are not as many as its ISIs, in a matrix"
         got = f"{' × '.join(map(str, sweeps.shape))} samples and {len(beside)} ISIs"
@@ -78,3 +85,65 @@ def _require_zero(name: str, times: Any, rate_hz: float, pulse_at_ms: float, sou
         remedy = "Correct pulse_at_ms in the layout; if it is right, leave that vector out of the file."
         expected = f"{zero_ms:g} ms after the first sample"
         raise InvalidValueError(what, got=f"{pulse_at_ms:g} ms", expected=expected, remedy=remedy)
+
+
+def _arrays(path: Path) -> dict[str, Any]:
+    """The arrays in a file of MATLAB by name, those in structures among them."""
+    content = frames.content_of(path)
+    if content.startswith(b"MATLAB 7.3"):
+        values = library("pymatreader", "import").read_mat(str(path))
+    else:
+        values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
+    if {"data", "datastart", "dataend", "titles"} <= values.keys():
+        remedy = "In LabChart: File, Export, LabChart text (.txt), and a layout: docs/your-data.md."
+        raise InvalidValueError("this has LabChart's channels one behind the other", got="data", remedy=remedy)
+    paths = dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
+    last = Counter(path[-1] for path in paths)
+    return {path[-1] if last[path[-1]] == 1 else ".".join(path): array for path, array in paths.items()}
+
+
+def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """The arrays in structures by their path; of a structure for each trial, the values of each of its fields."""
+    for name, value in values.items():
+        each = list(value) if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim == 1) else []
+        inner = value if isinstance(value, dict) else {}
+        if each and all(isinstance(one, dict) for one in each):
+            held = {key: [one.get(key, np.nan) for one in each] for key in each[0]}
+            inner = {key: [one if np.size(one) else np.nan for one in values] for key, values in held.items()}
+        yield from (((name, *path), array) for path, array in _flat(inner))
+        if not inner:
+            yield (name,), np.asarray(value)
+
+
+def _filled(array: Any) -> Any:
+    """An array whose empty cells are empty texts, if it has texts."""
+    if array.ndim == 1 and any(isinstance(one, str) for one in array):
+        return np.array([one if np.size(one) else "" for one in array], dtype=object)
+    return array
+
+
+def _vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
+    """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
+    squeezed = {name: _filled(array.squeeze()) if array.size > 1 else array for name, array in arrays.items()}
+    vectors = {name: array for name, array in squeezed.items()  # but not a cell's arrays, such as one for each ISI
+               if array.ndim == 1 and not any(isinstance(one, np.ndarray) for one in array)}  # fmt: skip
+    texts = {name: str(array.item()) for name, array in arrays.items() if array.size == 1 and array.dtype.kind in "UO"}
+    of_isis = {name for name in vectors if name == layout.columns.get("isi") or letters(name) in COLUMNS["isi"]}
+    longest = max((len(vectors[name]) for name in of_isis or vectors), default=0)
+    if longest == 0:
+        what = "the file has no vectors that could be the columns of a table"
+        remedy = "Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
+        raise InvalidValueError(what, got=", ".join(arrays) or "nothing that can be read", remedy=remedy)
+    alone = {
+        name: array.ravel() for name, array in arrays.items() if array.size == 1 and _OF_TRIALS.search(words_of(name))
+    }
+    for name, vector in {**vectors, **alone}.items():
+        is_longer = np.any(vector > (name not in alone)) if vector.dtype.kind in "iuf" else False
+        if len(vector) != longest and is_longer and key_of_flags(name):
+            what = f"the vector {name!r} is not as long as that of the ISIs, as if it had the numbers of some trials"
+            remedy = "Save one in its place that has for each trial 1 if it does not count, and 0 if it does: exclude."
+            raise InvalidValueError(what, got=vector.tolist()[:5], remedy=remedy)
+    units = {name: text for name, text in texts.items() if letters(name).endswith(("unit", "units"))}
+    table = pd.DataFrame({**{name: vector for name, vector in vectors.items() if len(vector) == longest}, **units})
+    table.attrs["title"] = "\n".join(text for name, text in texts.items() if name not in units)
+    return table
