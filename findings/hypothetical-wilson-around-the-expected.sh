@@ -4,7 +4,7 @@
 # Expected: docstring of BinomialTest: four intervals for the probability of success; Wilson's is made with the proportion seen.
 # Seen: it is made with p, the proportion of the null hypothesis, one half by default: 682 successes of 925 (0.737) have 0.468 to
 #   0.532, as has any other result, and as the docstring's own example shows beside three intervals from 0.707 to 0.765. For
-#   "greater" all but Clopper and Pearson's begin above the estimate, since the quantile is negative there and is subtracted.
+#   "greater" Agresti and Coull's and the arcsine's begin above the estimate: the quantile is negative there, and is subtracted.
 # Hurts: proportions of responses and hit rates: the interval depends on the number of trials alone.
 set -euo pipefail
 tmp=$(mktemp -d)
