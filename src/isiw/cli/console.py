@@ -189,7 +189,7 @@ def log_exists(source: str | Path) -> bool:
 
 
 def free_beside(log: Path, suffix: str, *, overwrite: bool = False) -> Path:
-    """Where a file of a session goes that nobody gave a place: beside its log, under a name that is free."""
+    """Where a file goes that nobody gave a place: beside its log, under a free name, or the log's to overwrite."""
     stem = Path(log.name.removesuffix(".part")).stem
     if overwrite:
         return log.with_name(f"{stem}{suffix}")

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import Any, Final, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from isiw.window import Window
 
 Values: TypeAlias = Array | Sequence[float | None] | Sequence[bool | None]
 """One value a person, as an array or plain; None is not known."""
+
+GIVEN_COUNTS: Final = 0.3
+"""As how much of a trial a pulse over the recruitment curve before the first pair counts (decisions 53 and 61)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,15 +11,13 @@ from isiw.checks import Checked, Count, Positive, Share, number
 from isiw.decision import OF_THE_WINDOW, StopDecision, StopKind
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
+from isiw.models.protocol import GIVEN_COUNTS
 from isiw.strategy.decisions import Progress, StoppingRule, looks_back, stimuli_left
 from isiw.summary import SURE
 from isiw.text.sanitize import counted
 
 MOST_BY_TIME: Final = 0.05
 """No session stops on a window while changes with time explain it all with more probability than this."""
-
-OF_GIVEN: Final = 0.3
-"""As how much of a pair a pulse over the recruitment curve counts that was given before the pairs (decision 61)."""
 
 
 def _stop_unless_by_time(kind: StopKind, estimate: WindowEstimate, reason: str) -> StopDecision:
@@ -161,7 +159,7 @@ class SmallGain(Checked):
         size = f"less than {self.gain:g}" if gained < self.gain else f"{gained:.2f}"
         added = f"added {size} to the expected F1"
         small = self.gain > 0 and gained < self.gain and now.probability >= self.min_probability
-        if small and progress.told + OF_GIVEN * progress.given >= self.min_told:
+        if small and progress.told + GIVEN_COUNTS * progress.given >= self.min_told:
             reason = f"Another {self.last} stimuli would add little: the last {self.last} {added}."
             return _stop_unless_by_time(StopKind.SMALL_GAIN, now, reason)
         since = f"the last {self.last} stimuli {added}"

@@ -20,6 +20,7 @@ from isiw.models.particles.levels import CARRIED, Level, along_curves, drawn, fo
 from isiw.models.particles.misfit import Bets
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import NoiseKind, recruits
+from isiw.models.protocol import GIVEN_COUNTS
 from isiw.models.shared.draws import OTHER_HALF, TAUGHT, seeds, stream, systematic
 from isiw.models.shared.history import BY_CURVES, COUNTS, SHIFT, History
 from isiw.native.engine import Seeds, log_likelihoods
@@ -33,10 +34,6 @@ LEAST_ACCEPTED = 0.05
 
 LEAST_DISTINCT = 0.4
 """Share of the particles that must differ from each other after the moves."""
-
-
-OF_GIVEN = 0.3
-"""As how much of a trial a pulse alone counts that was given before the pairs (decision 53)."""
 
 
 UNHEEDED = 50.0
@@ -225,7 +222,7 @@ class Swarm:
         fields = law.meanings(rows.values[row : row + 1], rows.kinds[row : row + 1], -1)
         likely = np.array([log_likelihoods(fields, pulse[np.newaxis, np.newaxis])[0, curved] for pulse in pulses])
         weights = rows.log_weights[row, curved]
-        found = log_sum(weights + (1.0 - OF_GIVEN) * likely) - log_sum(weights - OF_GIVEN * likely)
+        found = log_sum(weights + (1.0 - GIVEN_COUNTS) * likely) - log_sum(weights - GIVEN_COUNTS * likely)
         return float(found.sum())
 
     @property
@@ -341,7 +338,7 @@ class Swarm:
             columns[..., BY_CURVES] = np.nan
             return History(columns)
         given = elsewhere & np.isnan(columns[..., 0]) & self.before_pairs
-        columns[given, COUNTS] = OF_GIVEN
+        columns[given, COUNTS] = GIVEN_COUNTS
         if self.halves > 1:
             unheeded = given & (np.arange(len(columns)) % 2 > 0)[:, np.newaxis]
             columns[unheeded, 2:4], columns[unheeded, SHIFT] = (-np.inf, np.inf), 0.0
