@@ -56,7 +56,7 @@ def particles() -> Strategy:
 
 @dataclass(frozen=True)
 class Scores:
-    """An acquisition function that gives the same scores whatever is believed."""
+    """An acquisition function that gives the same scores whatever the posterior."""
 
     values: Array
     needs: tuple[type, ...] = ()

@@ -236,7 +236,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         decide: Callable[[], StopDecision] | None = None,
         ask_next: Callable[[], float | None] = lambda: None,
     ) -> Known:
-        """Log, if the log is open, what is known after the last trial, whether to stop, and else what is asked next."""
+        """Log, if the log is open, what is known after the last trial, whether to stop, and else the next ISI."""
         decision = self._freely(decide or self.learner.decision)
         known = Known(decision, None if decision.stop else ask_next())
         if self._sink.is_open:
