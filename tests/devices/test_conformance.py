@@ -654,12 +654,6 @@ def test_an_amplifier_that_blanks_the_pulse_and_the_artefact_of_a_tap_are_no_lat
     check_device(lambda: Blanking(blanked_ms), DesignSpace(25, 320, reference="impact"), clock=VirtualClock())
 
 
-def test_a_simulated_person_has_a_muscle() -> None:
-    rig = PhantomRig(10.0)
-    rig.simulated = True
-    check_device(lambda: rig, RIG_SPACE)
-
-
 def test_a_device_that_was_checked_is_gone_as_its_streams_would_keep_their_listeners() -> None:
     made: list[weakref.ref[SimulatedDevice]] = []
 
