@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, Never, TypeAlias
 
 import pytest
@@ -20,14 +20,6 @@ MakePunctual: TypeAlias = Callable[..., PunctualDevice]
 
 SHORT_S = 0.05
 STIMULUS = Stimulus(0, 50.0)
-
-
-@pytest.fixture
-def released() -> Iterator[threading.Event]:
-    """What hangs, hangs until this is set, at the end of the test."""
-    event = threading.Event()
-    yield event
-    event.set()
 
 
 @pytest.fixture
