@@ -9,10 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-SCRIPTS = {
-    "limits": "--cohorts late --people 2 --trials 5",
-    "people": "--cohorts gaussian --people 2 --trials 5",
-}
+SCRIPTS = {"limits": "--cohorts late --people 2 --trials 5", "people": "--cohorts gaussian --people 2 --trials 5"}
 
 
 def run(name: str, arguments: list[str]) -> None:

@@ -413,10 +413,7 @@ def test_the_suite_finds_a_rig_that_gives_a_pulse_with_a_tap_alone(space: Design
     ("device", "announced"),
     [
         (Hardware(), "This check stimulates: 3 pairs and one magnetic pulse alone, 5 s apart. It then arms"),
-        (
-            RememberingHardware(),
-            "This check stimulates: 8 pairs and one magnetic pulse alone, 5 s apart. It then arms",
-        ),
+        (RememberingHardware(), "This check stimulates: 8 pairs and one magnetic pulse alone, 5 s apart. It then arms"),
     ],
 )
 def test_the_suite_says_beforehand_that_it_stimulates(space: DesignSpace, device: Hardware, announced: str) -> None:

@@ -233,11 +233,7 @@ def test_the_blocks_after_a_restart_are_due_when_they_were_whatever_the_clock_wa
     clock.time_s += 15.0
     clock.set_by_s = set_by_s
     again = resume(
-        log,
-        device(simulated=False),
-        knowing(),
-        clock=FarClock(clock),
-        safeguards=Safeguards(on_pause=lambda _: True),
+        log, device(simulated=False), knowing(), clock=FarClock(clock), safeguards=Safeguards(on_pause=lambda _: True)
     )
     again.run()
     record = read_session(log)

@@ -241,9 +241,7 @@ def test_rests_that_limit_nothing_are_refused_where_they_are_stated_and_go_on_fr
     assert {name: getattr(header, name) for name in part} == part
 
 
-def test_the_first_stimulus_after_resuming_waits_a_whole_interval(
-    interrupted: Path,
-) -> None:
+def test_the_first_stimulus_after_resuming_waits_a_whole_interval(interrupted: Path) -> None:
     resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert read_session(interrupted).intents[4].t_s == 5.0
 
@@ -258,9 +256,7 @@ def test_another_strategy_is_refused_before_anything_happens(interrupted: Path) 
     assert interrupted.read_bytes() == before
 
 
-def test_without_verification_the_logged_trials_are_told_as_they_are(
-    interrupted: Path,
-) -> None:
+def test_without_verification_the_logged_trials_are_told_as_they_are(interrupted: Path) -> None:
     result = resume(interrupted, ScriptedDevice(), scripted_strategy(10, seed=1), verify=False).run()
     assert len(result.trials) == 10
 
@@ -407,9 +403,7 @@ def test_what_was_asked_before_an_exclusion_is_compared_as_it_was_asked(
     assert again.trials == result.trials
 
 
-def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(
-    interrupted: Path,
-) -> None:
+def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(interrupted: Path) -> None:
     with LogWriter.continuing(interrupted, salvage(interrupted), read_session(interrupted).header) as writer:
         writer.append(Intent(trial=5, isi_ms=77.0))  # intent and trial 4 are lost; what was told of it is not known
     result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()

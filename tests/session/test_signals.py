@@ -25,10 +25,7 @@ from isiw.sweeps import Measurement
 from isiw.trials import Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 
-pytestmark = [
-    pytest.mark.skipif(os.name == "nt", reason="POSIX signals"),
-    pytest.mark.usefixtures("terminal"),
-]
+pytestmark = [pytest.mark.skipif(os.name == "nt", reason="POSIX signals"), pytest.mark.usefixtures("terminal")]
 
 TESTS = Path(__file__).parents[1]
 HANG_S = 20.0  # what hangs is interrupted at once; where it is not, the test fails after this time

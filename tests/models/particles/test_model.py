@@ -338,14 +338,7 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [
-        {"particles": 1},
-        {"particles": 2.5},
-        {"particles": 100_001},
-        {"thinned": 0},
-        {"detection_limit_mv": 0.0},
-    ],
+    "wrong", [{"particles": 1}, {"particles": 2.5}, {"particles": 100_001}, {"thinned": 0}, {"detection_limit_mv": 0.0}]
 )
 def test_an_invalid_model_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
