@@ -50,6 +50,8 @@ def test_the_version_is_shown(isiw: Command) -> None:
         (["run", "--subject", "reel"], "subject.kind"),
         (["show", "nowhere.mcap"], "no such log"),
         (["resume", "nowhere.mcap"], "no such log"),
+        (["study", "run", "nowhere.toml"], "cannot be read"),
+        (["study", "summary", "nowhere"], "cannot be read"),
     ],
 )
 def test_an_error_is_a_message_and_exit_code_1(isiw: Command, arguments: list[str], message: str) -> None:
