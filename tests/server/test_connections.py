@@ -8,7 +8,7 @@ import socket
 import ssl
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from isiw.server.guard import Connection
 from isiw.server.live.page import file_of
 from server.live.watched import Watched
 from server.serving import BEARER, NOBODY, WITH_OPENSSL, certified, client_of, done, refused, server
+from waiting import until
 
 HALF = b"GET /sessions HTTP/1.1\r\nX: "
 IN_TIME_S = 1.0
@@ -52,13 +53,6 @@ def answer_on(connection: socket.socket) -> tuple[int, dict[str, dict[str, str]]
     content: dict[str, dict[str, str]] = json.loads(response.read())
     assert connection.recv(1) == b""
     return response.status, content
-
-
-def until(holds: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + 10
-    while not holds():
-        assert time.monotonic() < end_s, "it took too long"
-        time.sleep(0.01)
 
 
 def port_of(client: httpx.Client) -> int:
