@@ -10,31 +10,22 @@
     python -m benchmarks.before_and_now honest before now --out benchmarks/results/realities
     python -m benchmarks.before_and_now speed ../before/src src > benchmarks/results/before_and_now_speed.md
     python -m benchmarks.before_and_now session ../before/src src > benchmarks/results/session_speed.md
-    python -m benchmarks.before_and_now compiling ../before/src src > benchmarks/results/compiling.md
-    python -m benchmarks.before_and_now start ../before/src src > benchmarks/results/before_and_now_start.md
 
 `run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both, `stops` where
 the stopping rule of each ends, `honest` how often each is sure and wrong; `speed` and `session` have both run the same
-sessions in turn, `compiling` the first trials on a machine, `start` the same commands about a log. The hit delay is
-stated where a version can be told it.
+sessions in turn. The hit delay is stated where a version can be told it.
 Reported people come from seed 100,000 on; seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
 
 import inspect
-import itertools
-import json
 import os
 import platform
-import shutil
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -44,7 +35,6 @@ import torch
 import typer
 
 import isiw
-from benchmarks.earlier import logged_session
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.studies import (
@@ -74,8 +64,6 @@ def run(
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     trials: Annotated[int, typer.Option(help="Trials a session.")] = 40,
     to_stopping: Annotated[int | None, typer.Option(help="So many trials, and where the rule ends.")] = None,
-    *,
-    earlier_prior: Annotated[bool, typer.Option(help="With the prior of 1bbe107 in this version.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("now"),
 ) -> None:
     """Run the default of the isiw that is imported."""
@@ -83,7 +71,7 @@ def run(
     for name in cohorts.split(","):
         last, stopping = (trials, "ignored") if to_stopping is None else (to_stopping, "noted")
         marks = tuple(sorted({*(mark for mark in (*MARKS, *LATER) if mark <= last), last}))
-        study = study_of(name, people, seed, marks, stopping, settings=prior_of_1bbe107() if earlier_prior else None)
+        study = study_of(name, people, seed, marks, stopping)
         results = conduct(study, out / f"{name}.study", executor=Processes(workers))
         results.rows().to_parquet(out / f"{name}.parquet")
 
@@ -182,31 +170,21 @@ def speed(
     laps: Annotated[int, typer.Option(help="How often each runs 50 sessions of 30 trials.")] = 4,
 ) -> None:
     """Print the processor time of both versions, each lap first as often as second; the stopping rule is ignored."""
-    _print_ratios(before, now, laps, _lap_s, "50 sessions of `recruitment` side by side, 30 trials each")
-
-
-def _print_ratios(before: Path, now: Path, laps: int, spent_s: Callable[[Path, int], float], what: str) -> None:
-    """Print the processor time that something takes with both versions, by lap, and its ratio."""
     rows = []
     for number in range(laps):
         order = (before, now) if number % 2 == 0 else (now, before)
-        spent = {source: spent_s(source, number) for source in order}
+        spent = {source: _of_lap(source, "lap", number)[0] for source in order}
         rows.append((number, spent[before], spent[now], spent[before] / spent[now]))
     print(f"- command: `{command_of('before_and_now')}`")
     print(f"- {made_with('torch')}; {platform.machine()}, one thread")
-    print(f"- processor time of {what}\n")
+    print("- processor time of 50 sessions of `recruitment` side by side, 30 trials each\n")
     headings = ["seed", "before_s", "now_s", "ratio"]
     print(pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=(".0f", ".2f", ".2f", ".2f")))
 
 
-def _lap_s(source: Path, seed: int) -> float:
-    """Processor time of 50 sessions with the isiw in a folder [s]."""
-    return _of_lap(source, "lap", seed)[0]
-
-
-def _of_lap(source: Path, lap: str, seed: int, more: dict[str, str] | None = None) -> list[float]:
-    """The numbers that a lap with the isiw in a folder prints, with more in its environment."""
-    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"} | (more or {})
+def _of_lap(source: Path, lap: str, seed: int) -> list[float]:
+    """The numbers that a lap with the isiw in a folder prints."""
+    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "benchmarks.before_and_now", lap, str(seed)]
     ended = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)  # noqa: S603 - this file
     return [float(number) for number in ended.stdout.split()]
@@ -260,31 +238,6 @@ def _spent_s(seed: int, trials: int) -> np.ndarray:
     return np.array(spent_s)
 
 
-@app.command()
-def compiling(
-    before: Annotated[Path, typer.Argument(help="Folder src of the other version.")],
-    now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
-    laps: Annotated[int, typer.Option(help="How often each compiles everything.")] = 4,
-) -> None:
-    """Print the processor time that compiling adds to the first trials on a machine, each version in turn."""
-    what = "three trials of the default with a decision after each, whose loops are compiled, less\n"
-    _print_ratios(before, now, laps, _compiling_s, f"{what}  that of the same in a process that loads them")
-
-
-def _compiling_s(source: Path, seed: int) -> float:
-    """Processor time that compiling takes with the isiw in a folder [s]."""
-    with tempfile.TemporaryDirectory() as empty:
-        first, second = (_of_lap(source, "first-lap", seed, {"NUMBA_CACHE_DIR": empty})[0] for _ in range(2))
-    return first - second
-
-
-@app.command(hidden=True)
-def first_lap(seed: int) -> None:
-    """Print the processor time of the first three trials with the isiw that is imported [s]."""
-    torch.set_num_threads(1)
-    print(_spent_s(seed, 3).sum())
-
-
 @app.command(hidden=True)
 def lap(seed: int) -> None:
     """Print the processor time of 50 sessions with the isiw that is imported [s]."""
@@ -295,92 +248,6 @@ def lap(seed: int) -> None:
     began_s = time.process_time()
     run_unit(unit)
     print(time.process_time() - began_s)
-
-
-@app.command()
-def start(
-    before: Annotated[Path, typer.Argument(help="Folder src of the other version.")],
-    now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
-    laps: Annotated[int, typer.Option(help="How often each runs each command; the fastest counts.")] = 3,
-) -> None:
-    """Print the processor time and peak memory of commands that learn nothing, of both versions in turn."""
-    with tempfile.TemporaryDirectory() as folder:
-        log = logged_session(isiw.subjects.cohort("recruitment", 1, 10_000)[0], "s", 10_000, 60, Path(folder))
-        page, picture, tables = (Path(folder) / name for name in ("page.html", "picture.png", "tables"))
-        commands = {
-            "--help": ["--help"],
-            "strategies": ["strategies"],
-            "strategies default": ["strategies", "default"],
-            "show": ["show", log],
-            "plot": ["plot", log, "--overwrite", "-o", picture],
-            "report": ["report", log, "--overwrite", "-o", page],
-            "export": ["export", log, tables],
-        }
-        rows = []
-        for name, arguments in commands.items():
-            used: dict[Path, list[tuple[float, float]]] = {before: [], now: []}
-            for _, source in itertools.product(range(laps), used):
-                used[source].append(_command(source, arguments))
-                shutil.rmtree(tables, ignore_errors=True)
-            (before_s, before_mb), (now_s, now_mb) = (min(used[source]) for source in used)
-            rows.append((name, before_s, now_s, now_s / before_s, before_mb, now_mb))
-    headings = ["isiw …", "before [s]", "now [s]", "ratio", "before [MB]", "now [MB]"]
-    print(f"- command: `{command_of('before_and_now')}`")
-    print(f"- {made_with('torch', 'pandas', 'scipy')}; {platform.machine()}, one thread")
-    print(f"- processor time (user and system) of each command, the least of {laps}, both in turn, and the peak of")
-    print("  its resident memory; the log is of 60 trials of the default, person 10,000 of `recruitment`\n")
-    print(
-        pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=("", ".2f", ".2f", ".2f", ".0f", ".0f"))
-    )
-
-
-# A process starts with the peak of the one that started it, so that is a small one.
-MEASURED = """
-import json, os, resource, sys
-quiet = [(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)]
-child = os.posix_spawn(sys.executable, [sys.executable, "-m", "isiw", *sys.argv[1:]], os.environ, file_actions=quiet)
-_, status, used = os.wait4(child, 0)
-print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6]))
-sys.exit(os.waitstatus_to_exitcode(status))
-"""
-
-
-def _command(source: Path, arguments: list[str | Path]) -> tuple[float, float]:
-    """Processor time [s] and peak memory [MB] of a command with the isiw in a folder."""
-    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-c", MEASURED, *arguments]
-    ended = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE)  # noqa: S603 - our own
-    time_s, peak_mb = json.loads(ended.stdout)
-    return time_s, peak_mb
-
-
-def prior_of_1bbe107() -> dict[str, Any]:
-    """Settings by which the priors of this version, of the window and for choosing ISIs, are those of 1bbe107."""
-    from isiw.models.particles.changes import ChangePrior  # noqa: PLC0415 - which earlier versions lack
-    from isiw.models.particles.laws import Intensity  # noqa: PLC0415
-    from isiw.models.particles.prior import Prior  # noqa: PLC0415
-    from isiw.models.particles.profile import Width  # noqa: PLC0415
-    from isiw.models.shared.scales import Scale  # noqa: PLC0415
-    from isiw.models.shared.start import Span  # noqa: PLC0415
-
-    prior, never = Prior(), 1e-9
-    hand = Scale(-19.0, 6.0)
-    spans = Span(0.7, 0.0, 115.0), Span(0.3, -30.0, 260.0, 20.0)
-    profile = replace(
-        prior.profile,
-        start=replace(prior.profile.start, spans=spans),
-        widths=(Width(0.7, Scale(100.0, 0.42)), Width(0.3, Scale(170.0, 0.5))),
-        early=(),
-    )
-    earlier = replace(
-        prior,
-        profile=profile,
-        muscles=tuple(replace(m, rest_pct=hand) if m.name == "hand" else m for m in prior.muscles),
-        intensities=(Intensity(1.0, Scale(90.0, 0.5)),),
-        session=replace(prior.session, far_drift_share=1e-6),
-        changes=ChangePrior(level=never, intensity=never, enhancement=never, scale=never),
-    )
-    return {"prior": earlier, "unusual_kept": 1 / 3}
 
 
 def study_of(

@@ -16,15 +16,7 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.metrics import trials_to_criterion
 from isiw.plots.comparison import study_figure
 from isiw.plots.style import save_figure
-from isiw.studies import (
-    Processes,
-    SimulatedSession,
-    Study,
-    conduct,
-    paired_sessions,
-    run_study,
-    summarise,
-)
+from isiw.studies import Processes, SimulatedSession, Study, conduct, paired_sessions, run_study, summarise
 
 MARKS = (0, 5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
 CRITERIA = (0.8, 0.9, 0.95)

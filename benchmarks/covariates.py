@@ -38,11 +38,7 @@ MARKS: Final = (1, 5, 10, 20)
 FORESEEN: Final = 100
 """People of each lab of whom only the expected start is compared with the true one."""
 
-NOTED: Final[Mapping[str, tuple[str, ...]]] = {
-    "nothing": (),
-    "height": ("height_cm",),
-    "age": ("age_years",),
-}
+NOTED: Final[Mapping[str, tuple[str, ...]]] = {"nothing": (), "height": ("height_cm",), "age": ("age_years",)}
 
 
 @dataclass(frozen=True)

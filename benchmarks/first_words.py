@@ -3,8 +3,7 @@
     python -m benchmarks.first_words > benchmarks/results/first_words.md
 
 Every command is a process of its own whose output is a pipe. Whenever it prints something, the processor time that it
-and its threads have taken so far is read, so that other work on the machine hardly matters. The compiled loops are
-there already: on a new machine each of them is announced before it is compiled. Linux only.
+and its threads have taken so far is read, so that other work on the machine hardly matters. Linux only.
 """
 
 from __future__ import annotations

@@ -26,8 +26,6 @@ FOLDER: Final = Path("benchmarks/results/quick")
 QUICK: Final[Mapping[str, str]] = {
     "after_effects": "--people 20 --out OUT",
     "another_day": "--people 4 --earlier-trials 8 --trials 8 --out OUT",
-    "another_version compare": "--out OUT",
-    "another_version run": "--cohorts gaussian --people 2 --out OUT",
     "arduino": "--pairs 200 --times 2 --noisy-pairs 12 --out OUT",
     "before_and_now compare": "--out OUT",
     "before_and_now run": "--cohorts gaussian --people 4 --out OUT",

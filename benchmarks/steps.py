@@ -4,7 +4,7 @@
 trial. `report` compares that with a CUSUM that knows the person's law, the size and the direction of the step, and
 whose threshold no more than 3 % of the sessions without a step reach. `bound` says how often the trials of a session
 could name its step to anyone who knows its trial, but neither the person nor the size. Reported people come from seed
-200,000 on. `run --knowing` runs a belief that knows what the people of a cohort have in common, `--first electrical`
+200,000 on. `run --knowing` runs a prior that knows what the people of a cohort have in common, `--first electrical`
 one to which an electrical pulse was stated.
 """
 
@@ -115,7 +115,7 @@ def run(
 
 
 def law_of(cohort: str) -> dict[str, Any]:
-    """Settings of a belief that knows the muscle, how many have a window, and what changes, as the cohort has it.
+    """Settings of a prior that knows the muscle, how many have a window, and what changes, as the cohort has it.
 
     Sizes of changes are normal there, about as large as the cohort's; so are the logs of the widths of narrow windows.
     """

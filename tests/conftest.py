@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import os
 import signal
-from collections.abc import Generator
+import threading
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -77,6 +78,23 @@ def few_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
     """A lab's prior is learnt in little time, for tests that are not about its numbers."""
     monkeypatch.setattr("isiw.priors.population.SWEEPS", 60)
     monkeypatch.setattr("isiw.priors.population.BURN_IN", 20)
+
+
+@pytest.fixture
+def released() -> Iterator[threading.Event]:
+    """What hangs, hangs until this is set, at the end of the test."""
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, for tests with the mark `browsing.IN_CHROMIUM`."""
+    from browsing import chromium  # noqa: PLC0415 - it imports playwright
+
+    with chromium() as browser:
+        yield browser
 
 
 @pytest.fixture

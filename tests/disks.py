@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import stat
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,24 @@ import pytest
 def no_room(_: object) -> Never:
     """In place of a call of the operating system that writes."""
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _replaced(file: Path) -> None:
+    content = file.read_bytes()
+    file.unlink()
+    file.write_bytes(content)
+
+
+HAPPENINGS: dict[str, Callable[[Path], object]] = {
+    "deleted": lambda file: file.unlink(),
+    "moved": lambda file: file.rename(file.with_name("elsewhere")),
+    "its folder deleted": lambda file: shutil.rmtree(file.parent),
+    "its folder moved": lambda file: file.parent.rename(file.parent.with_name("elsewhere")),
+    "shortened": lambda file: os.truncate(file, file.stat().st_size // 2),
+    "lengthened": lambda file: file.write_bytes(file.read_bytes() + b"more"),
+    "replaced": _replaced,
+}
+"""What may happen to a file while it is written, but on Windows."""
 
 
 def is_folder(handle: int) -> bool:

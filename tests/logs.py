@@ -5,27 +5,23 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from mcap.reader import make_reader
-
-from known import known
-
 
 def cut_after(log: Path, trials: int) -> None:
     """Leave of a closed log what a copy in part leaves: so many trials, cut at the end of a record."""
-    whole = log.read_bytes()
-    blocks = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
-    log.write_bytes(whole[: blocks[3 * trials + 1]])  # a header, then intent, trial and estimate of each
+    begins, _ = blocks_of(log)[3 * trials + 1]  # a header, then intent, trial and estimate of each
+    log.write_bytes(log.read_bytes()[:begins])
 
 
 def blocks_of(log: Path) -> list[tuple[int, int]]:
-    """Where each block of records of a closed log begins and ends."""
-    with log.open("rb") as file:
-        chunks = known(make_reader(file).get_summary()).chunk_indexes
-    return [(chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length) for chunk in chunks]
+    """Where each block of records of a log begins and ends, closed or not."""
+    whole = log.read_bytes()
+    starts = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
+    blocks = [(start, start + 9 + int.from_bytes(whole[start + 1 : start + 9], "little")) for start in starts]
+    return [(start, end) for start, end in blocks if whole[start] == 6]  # in the index each is named once more
 
 
 def damage(log: Path, block: int = -1) -> None:
-    """Change a bit of one block of a closed log."""
+    """Change a bit of one block of a log."""
     content = bytearray(log.read_bytes())
     content[blocks_of(log)[block][1] - 20] ^= 0x10
     log.write_bytes(content)

@@ -201,8 +201,7 @@ class Read(Checked):
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [{"share": 1.0}, {"share": math.nan}, {"share": -0.1}, {"most": 0}, {"ends_ms": [2.0, 1.0]}],
+    "wrong", [{"share": 1.0}, {"share": math.nan}, {"share": -0.1}, {"most": 0}, {"ends_ms": [2.0, 1.0]}]
 )
 def test_a_table_is_read_by_the_fields_own_checks_and_the_error_has_their_words_and_the_key(
     wrong: dict[str, Any],

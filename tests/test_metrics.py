@@ -133,11 +133,7 @@ def test_an_estimate_without_intervals_is_not_judged() -> None:
 @pytest.mark.parametrize(
     ("measure", "of", "message"),
     [
-        (
-            f1,
-            (TRUTH, ESTIMATE, SPACE),
-            "the true window .* got 'WindowEstimate'; expected Window or None. The",
-        ),
+        (f1, (TRUTH, ESTIMATE, SPACE), "the true window .* got 'WindowEstimate'; expected Window or None. The"),
         (f1, (SPACE, ESTIMATE, TRUTH), "the estimate .* got 'DesignSpace'; expected WindowEstimate or Window or None"),
         (f1, (ESTIMATE, TRUTH, None), "a design space is needed"),
         (covers, (TRUTH, ESTIMATE, SPACE), "the estimate .* got 'Window'; expected WindowEstimate. The estimate"),

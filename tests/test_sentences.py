@@ -107,10 +107,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
                 "itself, and not the MEP."
             ),
         ),
-        (
-            sentences.best_isi(SURE),
-            "Largest MEP at 90 ms (90 %: 80–101 ms).",
-        ),
+        (sentences.best_isi(SURE), "Largest MEP at 90 ms (90 %: 80–101 ms)."),
         (sentences.best_isi(NONE), ""),
         (
             sentences.excluded(NONE),
@@ -120,10 +117,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
             sentences.excluded(Estimate(probability=0.02, excluded_mv=0.001, excluded_pct_rmt=9.0)),
             "An enhancement of more than 2 µV is excluded with 90 % probability.",
         ),
-        (
-            sentences.expected_f1(PROBABLE),
-            "Expected F1: 0.40 (1: exact).",
-        ),
+        (sentences.expected_f1(PROBABLE), "Expected F1: 0.40 (1: exact)."),
         (
             sentences.unusual(Estimate(probability=0.5, unusual={"noise": 0.95, "drift": 0.1})),
             "This person is unlike most in noise (probability 0.95).",

@@ -248,10 +248,7 @@ def test_the_least_share_of_a_hypothesis_lies_between_0_and_1(min_share: float) 
 
 def test_the_profile_is_interpolated_between_grid_points() -> None:
     estimate = WindowEstimate(
-        1.0,
-        None,
-        grid_ms=np.array([0.0, 10.0]),
-        profile_quantiles_mv=np.array([[0.0, 1.0], [1.0, 2.0], [2.0, 5.0]]),
+        1.0, None, grid_ms=np.array([0.0, 10.0]), profile_quantiles_mv=np.array([[0.0, 1.0], [1.0, 2.0], [2.0, 5.0]])
     )
     band = estimate.profile([0.0, 5.0])
     assert band is not None

@@ -17,16 +17,7 @@ import pandas as pd
 from benchmarks.comparison.rows import Part
 from benchmarks.recorded_people import RecordedPerson, recordings
 from benchmarks.tables import kept
-from isiw.studies import (
-    Failure,
-    Processes,
-    SimulatedSession,
-    Study,
-    Unit,
-    conduct,
-    open_store,
-    run_unit,
-)
+from isiw.studies import Failure, Processes, SimulatedSession, Study, Unit, conduct, open_store, run_unit
 from isiw.studies.execution import Executor, one_thread
 from isiw.subjects import SimulatedSubject
 

@@ -142,8 +142,5 @@ def figure(results: list[dict[str, Any]]) -> Figure:
 def section(results: list[dict[str, Any]]) -> Section:
     """This part of the report."""
     return Section(
-        "Online, on waveforms (Table 5.3)",
-        PROSE,
-        [Table("Table 5.3.", summary(results))],
-        ("online", figure(results)),
+        "Online, on waveforms (Table 5.3)", PROSE, [Table("Table 5.3.", summary(results))], ("online", figure(results))
     )

@@ -18,11 +18,7 @@ from benchmarks.reduction.size import Size
 
 TRIALS_UNIT = math.log(1.3)
 SCORE_UNIT = 0.1
-FLOORS = {
-    "lowest tenth": "base",
-    "median": "floor: median of all MEPs",
-    "as it is": "floor: raw",
-}
+FLOORS = {"lowest tenth": "base", "median": "floor: median of all MEPs", "as it is": "floor: raw"}
 
 PROSE = """\
 Base: an observation is one recorded trial; MEPs outside the measured window as recorded; the floor as in the headline

@@ -33,23 +33,8 @@ class Size:
     default: tuple[tuple[str, int], ...] = ()
 
 
-FULL: Final = Size(
-    kim=88,
-    kim_default=0,
-    people=11,
-    people_default=0,
-    sweep=6,
-    readings=11,
-    online=1,
-)
+FULL: Final = Size(kim=88, kim_default=0, people=11, people_default=0, sweep=6, readings=11, online=1)
 FEW: Final = Size(
-    kim=2,
-    kim_default=2,
-    people=2,
-    people_default=2,
-    sweep=2,
-    readings=1,
-    online=1,
-    default=(("max_trials", 6),),
+    kim=2, kim_default=2, people=2, people_default=2, sweep=2, readings=1, online=1, default=(("max_trials", 6),)
 )
 """So few that little can be concluded."""

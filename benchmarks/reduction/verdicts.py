@@ -10,16 +10,7 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.dissertation.claims import KINDS, REPRODUCED, Claim, by_kind, claims_as_json, put_to_test
-from benchmarks.reduction import (
-    comparison,
-    gaussians,
-    initial,
-    online,
-    particles,
-    pf_readings,
-    reading_table,
-    wrong,
-)
+from benchmarks.reduction import comparison, gaussians, initial, online, particles, pf_readings, reading_table, wrong
 from benchmarks.reduction import dissertation as text
 from benchmarks.reduction.claims import ERRORS, SHARE, UNIT
 from benchmarks.reduction.conventional import TWELVE, shows_a_window

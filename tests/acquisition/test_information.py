@@ -12,20 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import (
-    ISIS_MS,
-    HandMadePosterior,
-    Score,
-    expected_gain,
-    some_posterior,
-    summed_variance,
-)
-from isiw.acquisition.information import (
-    Alternating,
-    MutualInformation,
-    WindowGain,
-    WindowInformation,
-)
+from acquisition.hand_made import ISIS_MS, HandMadePosterior, Score, expected_gain, some_posterior, summed_variance
+from isiw.acquisition.information import Alternating, MutualInformation, WindowGain, WindowInformation
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError

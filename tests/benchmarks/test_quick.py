@@ -24,14 +24,7 @@ BENCHMARKS = {
 }
 MODULES = sorted(path for path in (ROOT / "benchmarks").rglob("*.py") if not path.name.startswith("__"))
 MOST_S = 120.0
-NOT_HERE = {
-    "another_version compare",
-    "another_version run",
-    "before_and_now compare",
-    "before_and_now stops",
-    "before_and_now speed",
-    "steps report",
-}
+NOT_HERE = {"before_and_now compare", "before_and_now stops", "before_and_now speed", "steps report"}
 """They compare with another version, or read what another command wrote."""
 
 

@@ -6,14 +6,10 @@ import runpy
 import sys
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 ROOT = Path(__file__).parents[2]
-SCRIPTS = {
-    "limits": "--cohorts late --people 2 --trials 5",
-    "people": "--cohorts gaussian --people 2 --trials 5",
-}
+SCRIPTS = {"limits": "--cohorts late --people 2 --trials 5", "people": "--cohorts gaussian --people 2 --trials 5"}
 
 
 def run(name: str, arguments: list[str]) -> None:
@@ -57,13 +53,3 @@ def test_where_two_versions_stop_is_compared_within_their_budgets(tmp_path: Path
     found = {what.strip(): (float(before), float(now)) for _, what, before, now, *_ in rows}
     assert found["stimuli"] == (6.0, 6.0)
     assert found["stopped_on_window"] == (0.0, 0.0)
-
-
-@pytest.mark.slow
-def test_a_version_that_is_this_one_says_the_same_of_the_same_people(tmp_path: Path) -> None:
-    few = ["--cohorts", "fading", "--people", "2", "--seed", "1"]
-    run("another_version", ["run", "src", *few, "--out", str(tmp_path / "another")])
-    run("before_and_now", ["run", *few, "--workers", "1", "--out", str(tmp_path / "now")])
-    columns = ["person", "trial", "f1", "true_window", "start_ms", "end_ms", "probability", "expected_f1"]
-    another, now = (pd.read_parquet(tmp_path / name / "fading.parquet")[columns] for name in ("another", "now"))
-    pd.testing.assert_frame_equal(another.reset_index(drop=True), now.reset_index(drop=True))

@@ -58,7 +58,7 @@ def test_commands_that_learn_nothing_need_no_library_that_learns(
 @pytest.mark.slow
 def test_a_file_is_refused_before_anything_that_analyses_it_is_loaded(tmp_path: Path) -> None:
     (tmp_path / "P01.csv").write_text("isi_ms,mep_mv\n10,.3\n20,x\n")
-    absent = LEARNING | TABLES | {"scipy", "numba", "mne"}
+    absent = LEARNING | TABLES | {"scipy", "mne"}
     started = [sys.executable, "-c", WITHOUT.format(absent=absent, commands=["analyse P01.csv --reference impact"])]
     ended = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True, check=False)  # noqa: S603 - our own
 

@@ -1,22 +1,19 @@
 from __future__ import annotations
 
-import ctypes
 import os
 import re
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-import typer
 
 from cli.conftest import COMMAND, Command
 from isiw import __version__
 from isiw.cli import console
-from isiw.cli.console import INTERRUPTED, errors_reported, show_statement, working
+from isiw.cli.console import INTERRUPTED, show_statement, working
 
 
 def test_a_pipe_gets_lines_while_a_command_is_at_work(
@@ -50,6 +47,8 @@ def test_the_version_is_shown(isiw: Command) -> None:
         (["run", "--subject", "reel"], "subject.kind"),
         (["show", "nowhere.mcap"], "no such log"),
         (["resume", "nowhere.mcap"], "no such log"),
+        (["study", "run", "nowhere.toml"], "cannot be read"),
+        (["study", "summary", "nowhere"], "cannot be read"),
     ],
 )
 def test_an_error_is_a_message_and_exit_code_1(isiw: Command, arguments: list[str], message: str) -> None:
@@ -125,19 +124,3 @@ def test_an_interrupt_before_a_command_begins_ends_in_a_sentence() -> None:
     )
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)  # noqa: S603
     assert (ended.returncode, ended.stdout, ended.stderr) == (INTERRUPTED, "", "Interrupted.\n")
-
-
-def test_an_interrupt_that_a_compiler_loses_ends_a_command_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    def lose() -> None:
-        raise KeyboardInterrupt
-
-    def work() -> None:
-        ctypes.CFUNCTYPE(None)(lose)()
-        end_s = time.monotonic() + 60
-        while time.monotonic() < end_s:
-            time.sleep(0.01)
-
-    with pytest.raises(typer.Exit) as ended, errors_reported("Interrupted: give the same command to continue."):
-        work()
-    assert ended.value.exit_code == INTERRUPTED
-    assert capsys.readouterr().err == "Interrupted: give the same command to continue.\n"

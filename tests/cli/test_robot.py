@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
 from pathlib import Path
 
 import pytest
 
-from cli.conftest import COMMAND, Command
+from cli.conftest import Command
 from isiw.config import load_config, session_for
 from isiw.config.resume import device_of_log, truth_of
 from isiw.errors import ConfigError, DeviceError
@@ -94,22 +91,6 @@ def test_the_vane_turns_the_wrist_in_the_sweeps_of_a_session(isiw: Command, tmp_
     first = next(trial.index for trial in record.table if trial.commanded_isi_ms is not None)
     assert max(record.sweep(first)["angle"].values) > 170
     assert record.header.config["isiw_run"]["device"]["settings"]["geometry"] == "subject3"
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
-def test_a_process_that_is_killed_at_the_robot_is_resumed_to_the_same_trials(isiw: Command, tmp_path: Path) -> None:
-    configured(tmp_path, "rotating-tapper", trials=10)
-    command = [*COMMAND, "run", "robot.toml", "--log", "killed.mcap"]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:  # noqa: S603
-        for _ in range(8):
-            known(process.stdout).readline()
-        process.send_signal(signal.SIGKILL)
-    assert isiw("resume", "killed.mcap", "robot.toml").exit_code == 0
-    assert isiw("run", "robot.toml", "--log", "whole.mcap").exit_code == 0
-    killed, whole = read_session("killed.mcap"), read_session("whole.mcap")
-    first_unknown = next((trial.index for trial in killed.table if trial.reason), len(killed.table))
-    assert killed.table.trials[:first_unknown] == whole.table.trials[:first_unknown]
 
 
 def test_the_true_window_is_that_of_the_person_under_the_robot(tmp_path: Path) -> None:

@@ -143,14 +143,3 @@ def test_sessions_that_failed_are_told_by_their_error(folder: Path) -> None:
     assert "even: RuntimeError: stuck (1 sessions)" in result.output
     assert study("run", folder).exit_code == 1
     assert study("run", folder, "--retry").exit_code == 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [(["run", "nowhere.toml"], "cannot be read"), (["summary", "nowhere"], "cannot be read")],
-)
-def test_an_error_is_a_message_and_exit_code_1(arguments: list[str], message: str) -> None:
-    result = study(*arguments)
-    assert result.exit_code == 1
-    assert result.output.splitlines()[-1].startswith("error: ")
-    assert message in result.output

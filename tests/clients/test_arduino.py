@@ -24,6 +24,7 @@ from isiw.errors import DeviceError, NotDelivered
 from isiw.sweeps import Measurement
 from isiw.testing import check_device
 from isiw.trials import Stimulus
+from waiting import until
 
 SPACE = isiw.DesignSpace(0, 120, reference="valve")
 
@@ -174,10 +175,3 @@ def test_arming_is_for_two_seconds_at_most_and_for_one_stimulus(board: Board) ->
         port.ask("4 ALONE", "4 FIRED")
         port.ask("5 ALONE", "5 ERR not armed")
     assert board.rises == [("trigger", 1040.0)]
-
-
-def until(true: Any, within_s: float = 3.0) -> None:
-    end_s = time.monotonic() + within_s
-    while not true():
-        assert time.monotonic() < end_s
-        time.sleep(0.002)

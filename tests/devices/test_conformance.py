@@ -413,10 +413,7 @@ def test_the_suite_finds_a_rig_that_gives_a_pulse_with_a_tap_alone(space: Design
     ("device", "announced"),
     [
         (Hardware(), "This check stimulates: 3 pairs and one magnetic pulse alone, 5 s apart. It then arms"),
-        (
-            RememberingHardware(),
-            "This check stimulates: 8 pairs and one magnetic pulse alone, 5 s apart. It then arms",
-        ),
+        (RememberingHardware(), "This check stimulates: 8 pairs and one magnetic pulse alone, 5 s apart. It then arms"),
     ],
 )
 def test_the_suite_says_beforehand_that_it_stimulates(space: DesignSpace, device: Hardware, announced: str) -> None:
@@ -652,12 +649,6 @@ class Blanking(PhantomRig):
 @pytest.mark.parametrize("blanked_ms", [-1.0, 5.0, 8.0])
 def test_an_amplifier_that_blanks_the_pulse_and_the_artefact_of_a_tap_are_no_late_pulse(blanked_ms: float) -> None:
     check_device(lambda: Blanking(blanked_ms), DesignSpace(25, 320, reference="impact"), clock=VirtualClock())
-
-
-def test_a_simulated_person_has_a_muscle() -> None:
-    rig = PhantomRig(10.0)
-    rig.simulated = True
-    check_device(lambda: rig, RIG_SPACE)
 
 
 def test_a_device_that_was_checked_is_gone_as_its_streams_would_keep_their_listeners() -> None:

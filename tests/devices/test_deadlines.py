@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, Never, TypeAlias
 
 import pytest
@@ -15,19 +15,12 @@ from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotD
 from isiw.sweeps import Measurement
 from isiw.trials import Stimulus
 from scripted import ScriptedDevice
+from waiting import until
 
 MakePunctual: TypeAlias = Callable[..., PunctualDevice]
 
 SHORT_S = 0.05
 STIMULUS = Stimulus(0, 50.0)
-
-
-@pytest.fixture
-def released() -> Iterator[threading.Event]:
-    """What hangs, hangs until this is set, at the end of the test."""
-    event = threading.Event()
-    yield event
-    event.set()
 
 
 @pytest.fixture
@@ -277,9 +270,7 @@ def test_a_device_that_was_never_armed_ends_no_process_where_it_cannot_be_stoppe
     with pytest.raises(DeviceTimeoutError):
         PunctualDevice(device, Deadlines(describe_s=SHORT_S), report=reports.append, still_armed=still_armed.append)
     released.set()
-    end_s = time.monotonic() + 30
-    while len(reports) < 3 and time.monotonic() < end_s:
-        time.sleep(SHORT_S)
+    until(lambda: len(reports) == 3, 30.0)
     monkeypatch.undo()
     PunctualDevice(device).stage()  # waits until the verb that was given up has been dealt with
     assert len(reports) == 3

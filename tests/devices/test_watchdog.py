@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from isiw.log.headers import ANY_HEADER, Header
 from isiw.report.tables import first_facts
 from isiw.testing import check_device
 from scripted import SPACE, FakeRealClock, ScriptedDevice, scripted_strategy
+from waiting import until
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="there a process inherits no connection")
 
@@ -56,16 +56,9 @@ def killed(record: Path, more: str = "") -> None:
         process.kill()
 
 
-def until(true: Callable[[], object], within_s: float = 2.0) -> None:
-    end_s = time.monotonic() + within_s
-    while not true():
-        assert time.monotonic() < end_s
-        time.sleep(0.005)
-
-
 def test_a_killed_process_has_its_device_disarmed(record: Path) -> None:
     killed(record)
-    until(lambda: b"disarm\n" in record.read_bytes())
+    until(lambda: b"disarm\n" in record.read_bytes(), 2.0)
 
 
 def test_a_process_that_it_forked_and_that_lives_on_does_not_hide_its_death(record: Path) -> None:

@@ -13,11 +13,9 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from isiw.design import VALVE_SPACE
 from isiw.dissertation.regression import FittedCurve, GaussianProcessRegression, RegressionModel
 from isiw.errors import InvalidValueError
-from isiw.models.shared.history import FloorTreatment
 from isiw.testing import check_model
-from isiw.window import Window
 from known import known
-from models.told_trials import bell_mv, told, trials_of
+from models.told_trials import bell_mv
 
 ISI_MS = np.linspace(0.0, 500.0, 40)
 MEP_MV = bell_mv(ISI_MS) + 0.015 * np.random.default_rng(5).standard_normal(40)
@@ -49,17 +47,6 @@ def test_sampled_curves_scatter_about_the_mean_as_the_process_does() -> None:
     curve = fit(samples=4000)
     assert curve.samples_mv.mean(axis=0) == pytest.approx(curve.mean_mv, abs=0.1 * curve.sd_mv.max())
     assert curve.samples_mv.std(axis=0) == pytest.approx(curve.sd_mv, rel=0.1)
-
-
-@pytest.mark.slow
-def test_a_floor_above_the_edges_level_hides_them_unless_it_is_subtracted() -> None:
-    trials = trials_of(lambda isi_ms: 0.02 + bell_mv(isi_ms))
-    raw, subtracted = (
-        told(RegressionModel(GaussianProcessRegression(), FloorTreatment(kind)), trials).estimate().window
-        for kind in ("raw", "subtracted")
-    )
-    assert raw == Window(0.0, 500.0)
-    assert (subtracted.start_ms, subtracted.end_ms) == pytest.approx((213.0, 313.0), abs=10.0)
 
 
 def test_without_trials_the_prior_stands_in() -> None:

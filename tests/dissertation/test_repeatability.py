@@ -38,22 +38,10 @@ from scripted import scripted_strategy
 # Table 3.2 of the dissertation: mean and SD [ms from the trial's start], number of taps.
 TABLE = {
     "bench": ({"fill": (523, 0), "descent": (621, 2), "hit": (688, 1), "away": (690, 1)}, 50),
-    "subject1": (
-        {"fill": (523, 0), "descent": (631, 5), "hit": (683, 4), "away": (698, 4), "memg": (701, 4)},
-        538,
-    ),
-    "subject2": (
-        {"fill": (523, 0), "descent": (626, 4), "hit": (672, 2), "away": (681, 2), "memg": (695, 2)},
-        324,
-    ),
-    "subject3": (
-        {"fill": (523, 0), "descent": (615, 2), "hit": (676, 1), "away": (693, 1), "memg": (695, 1)},
-        252,
-    ),
-    "subject4": (
-        {"fill": (523, 0), "descent": (629, 2), "hit": (682, 1), "away": (697, 1), "memg": (704, 2)},
-        346,
-    ),
+    "subject1": ({"fill": (523, 0), "descent": (631, 5), "hit": (683, 4), "away": (698, 4), "memg": (701, 4)}, 538),
+    "subject2": ({"fill": (523, 0), "descent": (626, 4), "hit": (672, 2), "away": (681, 2), "memg": (695, 2)}, 324),
+    "subject3": ({"fill": (523, 0), "descent": (615, 2), "hit": (676, 1), "away": (693, 1), "memg": (695, 1)}, 252),
+    "subject4": ({"fill": (523, 0), "descent": (629, 2), "hit": (682, 1), "away": (697, 1), "memg": (704, 2)}, 346),
 }
 
 

@@ -58,8 +58,7 @@ def test_the_model_conforms() -> None:
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [{"c": 0.0}, {"length_ms": 0.0}, {"epsilon": -0.1}, {"committee": 1}, {"committee": 2.5}],
+    "settings", [{"c": 0.0}, {"length_ms": 0.0}, {"epsilon": -0.1}, {"committee": 1}, {"committee": 2.5}]
 )
 def test_an_invalid_setting_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"c must|length_ms|epsilon|committee"):

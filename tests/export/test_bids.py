@@ -222,11 +222,6 @@ def test_all_trials_are_in_a_table_with_what_was_believed(data_set: Path, log: P
         assert back[name].tolist() == pytest.approx(trials[name].tolist(), nan_ok=True), name
 
 
-def test_the_log_itself_is_under_sourcedata(data_set: Path, log: Path) -> None:
-    (copy,) = (data_set / "sourcedata").rglob("*.mcap")
-    assert copy.read_bytes() == log.read_bytes()
-
-
 def test_what_is_known_of_the_recording_is_said_and_what_is_not_known_is_not_made_up(data_set: Path) -> None:
     sidecar = json.loads(next(data_set.rglob("*_emg.json")).read_text("utf-8"))
     assert (sidecar["RecordingType"], sidecar["SamplingFrequency"]) == ("epoched", 3000.0)

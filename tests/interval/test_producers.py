@@ -18,16 +18,6 @@ TABLE_62 = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("target_ms", "allowed"), [(300.0, 0.05), (500.0, 0.15)])
-@pytest.mark.parametrize("mode", [1, 2, 3, 4])
-def test_simulated_people_are_those_of_table_6_2(target_ms: float, allowed: float, mode: int) -> None:
-    times_ms = produce(Block(mode, target_ms), 8000, seed=3)
-    theirs = TABLE_62[target_ms][mode]
-    assert times_ms.mean() == pytest.approx(theirs[0], rel=allowed)
-    assert times_ms.std() == pytest.approx(theirs[1], rel=allowed)
-
-
 @pytest.mark.parametrize("mode", [1, 2, 3, 4])
 def test_who_has_no_noise_and_no_error_produces_the_target(mode: int) -> None:
     np.testing.assert_allclose(

@@ -45,7 +45,7 @@ def test_a_log_that_cannot_be_begun_on_a_full_disk_leaves_nothing_in_the_way(
 ) -> None:
     with monkeypatch.context() as patched:
         refusing(patched, "fsync", errno.ENOSPC, only)  # type: ignore[arg-type]
-        with pytest.raises(LogError, match=r"No space left.*s\.mcap"):
+        with pytest.raises(LogError, match=r"No space left.*s\.mcap.*another path\.$"):
             LogWriter.create(tmp_path / "s.mcap", header)
     assert list(tmp_path.iterdir()) == []
     LogWriter.create(tmp_path / "s.mcap", header).close()
@@ -60,7 +60,7 @@ def test_a_disk_that_locks_no_file_is_said_of_the_name_that_was_given(
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(fcntl, "flock", no_locks)
-    with pytest.raises(LogError, match=r"cannot be locked: No locks available; got .*s\.mcap'"):
+    with pytest.raises(LogError, match=r"cannot be locked: No locks available; got .*s\.mcap'.*local disk"):
         LogWriter.create(tmp_path / "s.mcap", header)
     assert list(tmp_path.iterdir()) == []
 

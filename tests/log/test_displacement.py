@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Never
 
 import pytest
 
+from disks import HAPPENINGS
 from isiw.errors import LogError
 from isiw.log.durable import DurableFile
 from isiw.log.headers import Header
@@ -21,37 +20,6 @@ from known import known
 from log.written import write_trials
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows does not let an open file be moved or deleted")
-
-
-def delete(part: Path) -> None:
-    part.unlink()
-
-
-def move(part: Path) -> None:
-    part.rename(part.with_name("elsewhere"))
-
-
-def delete_folder(part: Path) -> None:
-    shutil.rmtree(part.parent)
-
-
-def move_folder(part: Path) -> None:
-    part.parent.rename(part.parent.with_name("elsewhere"))
-
-
-def replace(part: Path) -> None:
-    content = part.read_bytes()
-    part.unlink()
-    part.write_bytes(content)
-
-
-def truncate(part: Path) -> None:
-    os.truncate(part, part.stat().st_size // 2)
-
-
-def lengthen(part: Path) -> None:
-    with part.open("ab") as file:
-        file.write(b"more")
 
 
 @pytest.fixture
@@ -77,22 +45,20 @@ def test_a_log_in_its_place_is_accepted(log: LogWriter) -> None:
     log.close()
 
 
-@pytest.mark.parametrize("happen", [delete, move, delete_folder, move_folder, replace, truncate, lengthen])
-def test_a_log_that_is_not_as_it_was_written_is_an_error(
-    log: LogWriter, path: Path, happen: Callable[[Path], None]
-) -> None:
-    happen(path.with_name("s.mcap.part"))
+@pytest.mark.parametrize("happening", HAPPENINGS)
+def test_a_log_that_is_not_as_it_was_written_is_an_error(log: LogWriter, path: Path, happening: str) -> None:
+    HAPPENINGS[happening](path.with_name("s.mcap.part"))
     with pytest.raises(LogError, match="as it was written"):
         log.require_in_place()
     with pytest.raises(LogError, match="as it was written"):
         log.close()
 
 
-@pytest.mark.parametrize("happen", [delete, move, delete_folder, move_folder, replace, lengthen])
+@pytest.mark.parametrize("happening", sorted(HAPPENINGS.keys() - {"shortened"}))
 def test_all_that_the_open_file_holds_is_saved_and_the_message_says_where(
-    log: LogWriter, path: Path, happen: Callable[[Path], None]
+    log: LogWriter, path: Path, happening: str
 ) -> None:
-    happen(path.with_name("s.mcap.part"))
+    HAPPENINGS[happening](path.with_name("s.mcap.part"))
     with pytest.raises(LogError) as caught:
         log.close()
     assert kept(caught.value).parent == path.parent
@@ -100,7 +66,7 @@ def test_all_that_the_open_file_holds_is_saved_and_the_message_says_where(
 
 
 def test_a_log_that_was_shortened_before_more_was_written_is_an_error(log: LogWriter, path: Path) -> None:
-    truncate(path.with_name("s.mcap.part"))
+    HAPPENINGS["shortened"](path.with_name("s.mcap.part"))
     write_trials(log, [5])
     with pytest.raises(LogError, match="bytes instead of"):
         log.require_in_place()
@@ -127,7 +93,7 @@ def test_of_a_log_that_was_shortened_header_trials_and_events_are_saved_from_mem
 
 def test_a_copy_replaces_no_other_copy(log: LogWriter, path: Path) -> None:
     path.with_name("s.rescued.mcap").write_bytes(b"precious")
-    delete(path.with_name("s.mcap.part"))
+    HAPPENINGS["deleted"](path.with_name("s.mcap.part"))
     with pytest.raises(LogError) as caught:
         log.close()
     assert kept(caught.value).name == "s.rescued1.mcap"
@@ -137,7 +103,7 @@ def test_a_copy_replaces_no_other_copy(log: LogWriter, path: Path) -> None:
 def test_where_the_folder_cannot_be_made_again_the_copy_is_among_the_temporary_files(
     log: LogWriter, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    delete_folder(path.with_name("s.mcap.part"))
+    HAPPENINGS["its folder deleted"](path.with_name("s.mcap.part"))
     path.parent.write_text("a file in the folder's place")
     temporary = tmp_path / "temporary"
     temporary.mkdir()

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
@@ -69,9 +68,8 @@ def test_a_record_that_was_not_finished_when_the_power_went_is_no_loss(
 
 
 def test_damage_before_the_last_record_of_an_unfinished_log_is_a_loss(broken_log: Path, header: Header) -> None:
-    whole = bytearray(broken_log.read_bytes())
-    whole[[match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)][5] + 60] ^= 0xFF
-    broken_log.write_bytes(whole[:-30])
+    damage(broken_log, 5)
+    broken_log.write_bytes(broken_log.read_bytes()[:-30])
     assert touched(broken_log, header).losses
 
 

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from isiw.log.schema import Event, Intent, Waveform
 from isiw.log.writer import LogWriter
 from isiw.sweeps import Channel
 from log.written import write_trials
+from logs import damage
 
 
 def test_the_trials_are_a_data_frame(finished_log: Path) -> None:
@@ -92,10 +92,7 @@ def test_the_last_header_holds(resumed_log: tuple[Path, Header]) -> None:
 
 def test_the_last_header_holds_where_its_record_is_lost(resumed_log: tuple[Path, Header]) -> None:
     log, tightened = resumed_log
-    whole = bytearray(log.read_bytes())
-    blocks = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
-    whole[blocks[len(blocks) // 2 - 1] + 40] ^= 0xFF  # the last one; the index at the end names each once more
-    log.write_bytes(whole)
+    damage(log)
     assert [message.topic for message in salvage(log).messages].count("/header") == 1
     record = read_session(log)
     assert record.losses

@@ -17,6 +17,7 @@ from isiw.log.writer import LogWriter
 from isiw.sweeps import Channel
 from isiw.trials import Status, Trial
 from log.written import write_trials
+from logs import blocks_of, damage
 
 
 def sample(below: int, size: int) -> list[int]:
@@ -93,9 +94,7 @@ def test_a_wrong_length_of_the_mark_behind_the_records_is_told(finished_log: Pat
 
 def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log: Path) -> None:
     whole = bytearray(finished_log.read_bytes())
-    blocks = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
-    first, other = blocks[4], blocks[12]
-    assert whole[first] == whole[other] == 6  # what a block begins with
+    (first, _), (other, _) = blocks_of(finished_log)[4], blocks_of(finished_log)[12]
     whole[first + 1 : first + 9] = (other - first - 9).to_bytes(8, "little")
     finished_log.write_bytes(whole)
     record = read_session(finished_log)
@@ -105,12 +104,12 @@ def test_a_length_that_swallows_other_blocks_costs_none_of_them(finished_log: Pa
 
 def test_a_log_torn_anywhere_keeps_every_trial_before_the_tear(broken_log: Path) -> None:
     whole = broken_log.read_bytes()
-    ends = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
-    for cut in sample(len(whole) - ends[0] - 2000, 60):
-        size = ends[0] + 2000 + cut
+    starts = [start for start, _ in blocks_of(broken_log)]
+    for cut in sample(len(whole) - starts[0] - 2000, 60):
+        size = starts[0] + 2000 + cut
         broken_log.write_bytes(whole[:size])
         record = read_session(broken_log)
-        complete = sum(end < size for end in ends) - 1  # the last block that began may be torn
+        complete = sum(start < size for start in starts) - 1  # the last block that began may be torn
         assert len(record.table) >= (complete - 1) // 2
         assert [trial.index for trial in record.table] == list(range(len(record.table)))
         assert record.losses or record.unknown or len(record.table) == (complete + 1) // 2
@@ -122,10 +121,7 @@ def test_a_session_that_was_killed_between_records_has_lost_nothing(broken_log: 
 
 
 def test_what_is_lost_is_said_in_words(finished_log: Path) -> None:
-    whole = bytearray(finished_log.read_bytes())
-    third = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)][5]
-    whole[third + 60] ^= 0xFF
-    finished_log.write_bytes(whole)
+    damage(finished_log, 5)
     record = read_session(finished_log)
     assert re.search(r"A block of \d+ bytes at byte \d+ fails its checksum and is lost", " ".join(record.losses))
     assert re.search(r"Records? \d+", " ".join(record.losses))
@@ -133,11 +129,8 @@ def test_what_is_lost_is_said_in_words(finished_log: Path) -> None:
 
 
 def test_without_its_first_block_a_log_still_has_its_header(finished_log: Path) -> None:
-    whole = bytearray(finished_log.read_bytes())
     original = read_session(finished_log)
-    first = whole.find(b"\x04\x00\x00\x00zstd")
-    whole[first + 60] ^= 0xFF
-    finished_log.write_bytes(whole)
+    damage(finished_log, 0)
     record = read_session(finished_log)
     assert record.header == original.header
     assert len(record.table) == 8
@@ -179,26 +172,15 @@ def test_a_channel_of_the_devices_own_is_known_without_the_block_that_defines_it
             log.append(Waveform.of(trial, Channel(np.arange(4.0), 1000.0, "N")), "grip")
             log.append(Trial(trial, Status.ACCEPTED, 5.0, isi_ms=5.0, mep_mv=0.1))
             log.sync()
-    whole = bytearray((tmp_path / "s.mcap").read_bytes())
-    blocks = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)]
-    whole[blocks[2] + 30] ^= 1  # the first with a grip: behind the header and the first intent
-    (tmp_path / "s.mcap").write_bytes(whole)
+    damage(tmp_path / "s.mcap", 2)  # the first with a grip: behind the header and the first intent
     record = read_session(tmp_path / "s.mcap")
     assert "fails its checksum" in record.losses[0]
     assert [sorted(record.sweep(trial)) for trial in range(3)] == [[], ["grip"], ["grip"]]
 
 
-def blocks_of(content: Any) -> Any:
-    """Where each block of a log begins, and where the record behind it does."""
-    starts = [match.start() - 37 for match in re.finditer(b"\x04\x00\x00\x00zstd", content)]
-    ends = [start + 9 + int.from_bytes(content[start + 1 : start + 9], "little") for start in starts]
-    return [pair for pair in zip(starts, ends, strict=True) if content[pair[0]] == 6]
-
-
 @pytest.mark.parametrize("block", [1, 5, 12])
 def test_a_closed_log_that_was_cut_at_a_records_end_is_damaged(finished_log: Path, block: Any) -> None:
-    whole = finished_log.read_bytes()
-    finished_log.write_bytes(whole[: blocks_of(whole)[block][1]])
+    finished_log.write_bytes(finished_log.read_bytes()[: blocks_of(finished_log)[block][1]])
     record = read_session(finished_log)
     assert re.fullmatch(
         r"The log ends at byte \d+ without the mark that closes it: it was cut off, .*", record.losses[0]
@@ -208,10 +190,8 @@ def test_a_closed_log_that_was_cut_at_a_records_end_is_damaged(finished_log: Pat
 
 
 def test_the_index_tells_how_many_stimuli_a_lost_block_told_of(finished_log: Path) -> None:
-    whole = bytearray(finished_log.read_bytes())
-    for start, _ in blocks_of(whole)[-2:]:  # the last intent, and its trial
-        whole[start + 60] ^= 0xFF
-    finished_log.write_bytes(whole)
+    for block in (-2, -1):  # the last intent, and its trial
+        damage(finished_log, block)
     record = read_session(finished_log)
     assert len(record.table) == 7
     assert [(intent.trial, intent.isi_ms) for intent in record.unknown] == [(7, None)]
@@ -220,9 +200,8 @@ def test_the_index_tells_how_many_stimuli_a_lost_block_told_of(finished_log: Pat
 
 
 def test_what_a_closed_log_lost_with_its_index_nobody_knows(finished_log: Path) -> None:
-    whole = bytearray(finished_log.read_bytes())
-    whole[blocks_of(whole)[-1][0] + 60] ^= 0xFF
-    finished_log.write_bytes(whole[:-60])
+    damage(finished_log)
+    finished_log.write_bytes(finished_log.read_bytes()[:-60])
     assert read_session(finished_log).end_lost
 
 
@@ -233,7 +212,7 @@ def test_a_block_that_is_there_twice_counts_once_and_is_reported(
 ) -> None:
     log = request.getfixturevalue(kind)
     original, whole = content(read_session(log)), log.read_bytes()
-    start, end = blocks_of(whole)[block]
+    start, end = blocks_of(log)[block]
     log.write_bytes(whole[:end] + whole[start:end] + whole[end:])
     record = read_session(log)
     assert content(record) == original
@@ -243,7 +222,7 @@ def test_a_block_that_is_there_twice_counts_once_and_is_reported(
 
 def test_blocks_that_changed_places_are_read_in_their_order_and_reported(broken_log: Any) -> None:
     original, whole = content(read_session(broken_log)), broken_log.read_bytes()
-    (first, middle), (again, last) = blocks_of(whole)[4:6]
+    (first, middle), (again, last) = blocks_of(broken_log)[4:6]
     broken_log.write_bytes(whole[:first] + whole[again:last] + whole[middle:again] + whole[first:middle] + whole[last:])
     record = read_session(broken_log)
     assert content(record) == original

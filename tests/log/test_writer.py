@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from disks import no_room
 from isiw.errors import LogError
 from isiw.log.headers import Header
 from isiw.log.record import read_session
@@ -76,17 +77,13 @@ def test_a_folder_that_cannot_be_created_is_named(tmp_path: Path, header: Header
         LogWriter.create(tmp_path / "file" / "s.mcap", header)
 
 
-def full_disk(_: int) -> Never:
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-
 def test_a_full_disk_is_an_error_and_what_was_synced_is_safe(
     tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     write_trials(log, range(3))
     with monkeypatch.context() as patched:
-        patched.setattr(os, "fsync", full_disk)
+        patched.setattr(os, "fsync", no_room)
         with pytest.raises(LogError, match="No space left"):
             write_trials(log, [3])
     assert len(read_session(tmp_path / "s.mcap").table) >= 3
@@ -104,22 +101,13 @@ def test_a_header_that_cannot_be_written_leaves_no_file(
     LogWriter.create(tmp_path / "s.mcap", header).close()
 
 
-def test_a_log_that_cannot_be_begun_leaves_no_file(
-    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(os, "fsync", full_disk)
-    with pytest.raises(LogError, match=r"No space left.*another path\.$"):  # none to resume
-        LogWriter.create(tmp_path / "s.mcap", header)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_log_that_is_gone_when_the_disk_fails_is_not_called_safe(
     tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log = LogWriter.create(tmp_path / "s.mcap", header)
     (tmp_path / "s.mcap.part").unlink()
     with monkeypatch.context() as patched:
-        patched.setattr(os, "fsync", full_disk)
+        patched.setattr(os, "fsync", no_room)
         with pytest.raises(LogError, match=r"No space left.*file is gone"):
             write_trials(log, [0])
     with pytest.raises(LogError, match="rescued"):
@@ -157,7 +145,7 @@ def test_a_log_that_cannot_go_on_stays_as_it_was(
     before, found = finished_log.read_bytes(), salvage(finished_log)
     unwritable = header.model_copy(update={"config": {"operator": None}})
     with monkeypatch.context() as patched:
-        patched.setattr(os, "fsync", full_disk if trouble == "disk" else os.fsync)
+        patched.setattr(os, "fsync", no_room if trouble == "disk" else os.fsync)
         with pytest.raises(LogError):
             LogWriter.continuing(finished_log, found, header, unwritable if trouble == "header" else header)
     assert list(finished_log.parent.iterdir()) == [finished_log]

@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from isiw.errors import InvalidValueError
 from isiw.plots.comparison import prior_figure
 from isiw.plots.style import save_figure
 
@@ -28,7 +27,5 @@ def test_each_quantity_has_a_panel_with_both_priors_as_they_were_given(table: An
     assert shown[0].get_legend_handles_labels()[1] == ["built-in", "this lab"]
 
 
-def test_the_picture_is_written_in_a_format_that_is_known(table: Any, tmp_path: Path) -> None:
+def test_the_picture_is_written(table: Any, tmp_path: Path) -> None:
     assert save_figure(prior_figure(table), tmp_path / "new" / "p.png").stat().st_size > 3000
-    with pytest.raises(InvalidValueError, match="format"):
-        save_figure(prior_figure(table), tmp_path / "p.docx")

@@ -8,7 +8,6 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from isiw.errors import InvalidValueError
 from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord
 from isiw.plots.session import BELOW_THE_MEAN, save_session_plot, session_figure
@@ -46,11 +45,6 @@ def line(axes: Axes, label: str) -> tuple[list[float], list[float]]:
 def test_a_session_is_drawn_into_a_file(record: SessionRecord, tmp_path: Path, suffix: str) -> None:
     path = save_session_plot(record, tmp_path / "new" / f"s{suffix}")
     assert path.stat().st_size > 5000
-
-
-def test_an_unknown_format_is_refused(record: SessionRecord, tmp_path: Path) -> None:
-    with pytest.raises(InvalidValueError, match="format is unknown"):
-        save_session_plot(record, tmp_path / "s.docx")
 
 
 def test_the_picture_shows_profile_trials_window_and_truth(record: SessionRecord) -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from isiw.dissertation.repeatability import study_preset
-from isiw.errors import InvalidValueError
 from isiw.plots.style import save_figure
 from isiw.plots.timeline import timing_figure
 
@@ -22,8 +21,3 @@ def test_the_errors_are_drawn_only_where_isis_were_commanded() -> None:
 def test_the_picture_is_saved(tmp_path: Path) -> None:
     path = save_figure(timing_figure(study_preset("subject1", taps=5, isi_ms=())), tmp_path / "new" / "timing.png")
     assert path.stat().st_size > 10_000
-
-
-def test_an_unknown_format_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(InvalidValueError, match="format"):
-        save_figure(timing_figure(study_preset("bench", taps=5, isi_ms=())), tmp_path / "timing.docx")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +14,27 @@ from isiw.log.headers import Header, StrategyRecipe
 from isiw.log.writer import LogWriter
 from isiw.signals.limits import SignalLimits
 from isiw.subjects.cohorts import cohort
+from isiw.subjects.responses import GainResponse, PeakProfile
 from isiw.subjects.subject import SimulatedSubject
 from isiw.trials import Status, Trial
 from isiw.types import Conditioning
 from isiw.visit import Visit
+from known import instance
+
+EARLY_MS = 20.0
 
 
 def gaussian_person(number: int = 0) -> SimulatedSubject:
     """A person whose MEPs tell much."""
     return cohort("gaussian", number + 1, 1)[number]
+
+
+def person(start_ms: float = EARLY_MS, gain: float = 3.0) -> SimulatedSubject:
+    """A person whose MEPs tell much, with the window elsewhere."""
+    usual = gaussian_person()
+    response = instance(GainResponse, usual.response)
+    profile = replace(instance(PeakProfile, usual.profile), start_ms=start_ms, width_ms=110.0)
+    return replace(usual, profile=profile, response=replace(response, gain_mv=gain * response.gain_mv))
 
 
 def write_log(

@@ -53,6 +53,16 @@ def leaves(values: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield from leaves(inner, (*way, key))
 
 
+def with_value(values: dict[str, Any], way: tuple[Any, ...], value: Any) -> str:
+    """A prior's file with another value somewhere."""
+    changed = copy.deepcopy(values)
+    place: Any = changed
+    for key in way[:-1]:
+        place = place[key]
+    place[way[-1]] = value
+    return tomli_w.dumps(changed)
+
+
 @pytest.mark.slow
 def test_a_prior_with_an_absurd_value_anywhere_is_refused_or_asks(values: dict[str, Any], tmp_path: Path) -> None:
     file = tmp_path / "lab.toml"
@@ -61,12 +71,7 @@ def test_a_prior_with_an_absurd_value_anywhere_is_refused_or_asks(values: dict[s
     refused, asked = 0, 0
     for way in leaves(values):
         for absurd in ABSURD:
-            changed = copy.deepcopy(values)
-            place: Any = changed
-            for key in way[:-1]:
-                place = place[key]
-            place[way[-1]] = absurd
-            file.write_text(tomli_w.dumps(changed))
+            file.write_text(with_value(values, way, absurd))
             try:
                 prior = load(file)
             except ConfigError as error:
@@ -93,11 +98,6 @@ def test_a_prior_with_an_absurd_value_anywhere_is_refused_or_asks(values: dict[s
 def test_what_no_person_or_session_has_is_refused_when_the_prior_is_loaded(
     values: dict[str, Any], tmp_path: Path, way: tuple[Any, ...], absurd: Any
 ) -> None:
-    changed = copy.deepcopy(values)
-    place: Any = changed
-    for key in way[:-1]:
-        place = place[key]
-    place[way[-1]] = absurd
-    (tmp_path / "lab.toml").write_text(tomli_w.dumps(changed))
+    (tmp_path / "lab.toml").write_text(with_value(values, way, absurd))
     with pytest.raises(ConfigError, match="cannot be used"):
         load(tmp_path / "lab.toml")

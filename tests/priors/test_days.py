@@ -21,24 +21,14 @@ from isiw.models.particles.prior import Prior
 from isiw.priors.days import recalled
 from isiw.session.afterwards import exclude
 from isiw.strategy.catalogue import make_strategy
-from isiw.subjects.responses import GainResponse, PeakProfile
-from isiw.subjects.subject import SimulatedSubject
 from isiw.types import Singles
 from isiw.visit import Visit
-from known import instance, known
+from known import known
 from logs import damage
 from native.drawn import Case
-from priors.logged import gaussian_person, write_log
+from priors.logged import EARLY_MS, person, write_log
 
-EARLY_MS, LATE_MS = 20.0, 200.0
-
-
-def person(start_ms: float = EARLY_MS, gain: float = 3.0) -> SimulatedSubject:
-    """A person whose MEPs tell much, with the window elsewhere."""
-    usual = gaussian_person()
-    response = instance(GainResponse, usual.response)
-    profile = replace(instance(PeakProfile, usual.profile), start_ms=start_ms, width_ms=110.0)
-    return replace(usual, profile=profile, response=replace(response, gain_mv=gain * response.gain_mv))
+LATE_MS = 200.0
 
 
 @pytest.fixture(scope="module")

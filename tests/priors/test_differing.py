@@ -13,19 +13,10 @@ from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError
 from isiw.log.record import SessionRecord, read_session
 from isiw.priors import Difference, differences
-from isiw.subjects.responses import GainResponse, PeakProfile
-from isiw.subjects.subject import SimulatedSubject
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit
-from known import instance, known
-from priors.logged import gaussian_person, write_log
-
-
-def person(start_ms: float, gain: float = 3.0) -> SimulatedSubject:
-    usual = gaussian_person()
-    response = instance(GainResponse, usual.response)
-    profile = replace(instance(PeakProfile, usual.profile), start_ms=start_ms, width_ms=110.0)
-    return replace(usual, profile=profile, response=replace(response, gain_mv=gain * response.gain_mv))
+from known import known
+from priors.logged import person, write_log
 
 
 @pytest.fixture(scope="module")

@@ -270,8 +270,7 @@ def test_a_session_is_recalled_with_what_its_strategy_was_told_of_rig_and_muscle
 
 
 @pytest.mark.parametrize(
-    ("settings", "visit"),
-    [({"intensity_pct_rmt": 110.0}, isiw.Visit()), ({}, isiw.Visit(intensity_pct_rmt=110.0))],
+    ("settings", "visit"), [({"intensity_pct_rmt": 110.0}, isiw.Visit()), ({}, isiw.Visit(intensity_pct_rmt=110.0))]
 )
 def test_a_session_is_recalled_at_the_intensity_that_strategy_or_visit_states(
     tmp_path: Path, settings: dict[str, Any], visit: isiw.Visit

@@ -11,10 +11,12 @@ from isiw.design import DesignSpace
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import SimulatedDevice
 from isiw.log.record import SessionRecord, read_session
+from isiw.log.schema import EstimateRecord
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
 from isiw.trials import Status, Trial
 from isiw.visit import Visit, VisitProtocol
+from known import instance
 from scripted import scripted_strategy
 
 HOSTILE = "<script>document.title='taken'</script><b>P07</b>"
@@ -49,6 +51,13 @@ def tapped(path: Path, trials: int = 6, subject: str = HOSTILE) -> SessionRecord
     )
     session.run()
     return read_session(path)
+
+
+def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
+    """The same session with another last estimate, without waveforms."""
+    entries = list(record.history)
+    entries[-1] = instance(EstimateRecord, entries[-1]).model_copy(update=changes)
+    return type(record)(record.path, record.header, tuple(entries), (), True)
 
 
 def pulsed(record: SessionRecord) -> SessionRecord:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, ViewportSize
 
-from browsing import IN_CHROMIUM, broken_rules, chromium, hard_to_read, screenshots
+from browsing import IN_CHROMIUM, broken_rules, hard_to_read, screenshots
 from isiw.log.record import SessionRecord, read_session
 from isiw.priors import Difference
 from isiw.report.comparison import save_comparison
@@ -54,12 +54,6 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
 @pytest.fixture(scope="module")
 def path(record: SessionRecord) -> Path:
     return save_report(record, record.path.with_suffix(".html"))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from isiw.log.record import SessionRecord, read_session
-from isiw.log.schema import EstimateRecord
 from isiw.report.words import final_statement
 from isiw.sentences import depression
 from isiw.session.loop import Session
 from isiw.sweeps import Measurement
 from isiw.visit import Visit
-from known import instance
+from report.sessions import with_estimate
 from scripted import ScriptedDevice, scripted_strategy
 
 ALONE = "This strategy looks for enhancement alone. At 120 % of RMT the tap may depress the MEP too"
@@ -25,12 +23,6 @@ def session(folder: Path, intensity_pct_rmt: float | None) -> SessionRecord:
     visit = Visit(intensity_pct_rmt=intensity_pct_rmt)
     Session(device, scripted_strategy(3), log=folder / "s.mcap", visit=visit).run()
     return read_session(folder / "s.mcap")
-
-
-def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
-    entries = list(record.history)
-    entries[-1] = instance(EstimateRecord, entries[-1]).model_copy(update=changes)
-    return type(record)(record.path, record.header, tuple(entries), (), True)
 
 
 def test_above_the_threshold_it_says_that_only_enhancement_was_looked_for(tmp_path: Path) -> None:

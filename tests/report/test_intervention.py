@@ -31,13 +31,7 @@ def test_a_page_shows_the_change_each_block_the_dose_and_the_window() -> None:
     window = [(0.0, 60.0, 120.0), (400.0, 70.0, 130.0)]
     page = Page(intervention_page(InterventionContents(PULSES, DELIVERED, window=window, subject=HOSTILE)))
     assert "TMS alone evokes more than before" in page.words
-    for said in (
-        "after 0 min",
-        "after 60 min",
-        "all blocks",
-        "45 pairs at 88–90 ms and 5 probes",
-        "window",
-    ):
+    for said in ("after 0 min", "after 60 min", "all blocks", "45 pairs at 88–90 ms and 5 probes", "window"):
         assert said in page.words
     assert "taken" in page.words  # the subject's code is text
 

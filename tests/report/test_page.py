@@ -18,7 +18,7 @@ from isiw.session.afterwards import exclude
 from isiw.summary import JUDGED_SINCE
 from isiw.trials import Trial
 from isiw.window import Window
-from logs import cut_after
+from logs import cut_after, damage
 from report.sessions import HOSTILE, Page, pulsed, tapped
 
 LOGS = Path(__file__).parents[1] / "data" / "logs"
@@ -133,10 +133,7 @@ def test_a_log_that_is_whole_and_closed_is_shown_without_a_warning(page: Page) -
 @pytest.mark.slow
 def test_a_damaged_log_says_at_the_top_what_is_lost(tmp_path: Path) -> None:
     tapped(tmp_path / "s.mcap", subject="P07")
-    whole = bytearray((tmp_path / "s.mcap").read_bytes())
-    blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
-    whole[blocks[4] + 60] ^= 0xFF
-    (tmp_path / "s.mcap").write_bytes(whole)
+    damage(tmp_path / "s.mcap", 4)
     said = Page(report_page(read_session(tmp_path / "s.mcap"))).words
     assert said.index("The log is damaged.") < said.index("Which trials were lost")
     assert "fails its checksum and is lost" in said

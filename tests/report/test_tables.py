@@ -62,9 +62,7 @@ def test_what_was_delivered_stands_beside_what_may_be(record: SessionRecord) -> 
     assert told["of them with an unknown outcome"] == ("0", "")
 
 
-def test_the_sessions_clock_says_nothing_across_a_resumption_nor_of_what_was_refused(
-    record: SessionRecord,
-) -> None:
+def test_the_sessions_clock_says_nothing_across_a_resumption_nor_of_what_was_refused(record: SessionRecord) -> None:
     after: list[Record] = [
         Event(kind="resume", trial=5, text=""),
         Intent(trial=6, isi_ms=1.0, t_s=26.0),

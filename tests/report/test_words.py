@@ -14,7 +14,7 @@ from isiw.decision import StopKind
 from isiw.design import DesignSpace
 from isiw.log.headers import StrategyRecipe
 from isiw.log.record import SessionRecord, read_session
-from isiw.log.schema import EstimateRecord, Event, Intent
+from isiw.log.schema import Event, Intent
 from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, trial_rows, truth_sentence
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
@@ -25,7 +25,7 @@ from isiw.trials import Status, Trial
 from isiw.types import Reference
 from isiw.visit import Visit
 from isiw.window import Window
-from known import instance
+from report.sessions import with_estimate
 from scripted import ScriptedDevice, scripted_strategy
 
 
@@ -34,12 +34,6 @@ def record(tmp_path: Path) -> SessionRecord:
     device = ScriptedDevice(lambda s: Measurement(0.0512, s.isi_ms, background_rms_uv=50.0 if s.trial == 1 else 2.0))
     Session(device, scripted_strategy(4), log=tmp_path / "s.mcap").run()
     return read_session(tmp_path / "s.mcap")
-
-
-def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
-    entries = list(record.history)
-    entries[-1] = instance(EstimateRecord, entries[-1]).model_copy(update=changes)
-    return type(record)(record.path, record.header, tuple(entries), (), True)
 
 
 def test_the_statement_has_window_intervals_counts_and_reason(record: SessionRecord) -> None:

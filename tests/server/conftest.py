@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
 import pytest
 
 from isiw.session import pausing
+from server.serving import client_of
+
+
+@pytest.fixture
+def client(tmp_path: Path) -> Iterator[httpx.Client]:
+    """A client of a server whose logs come to the test's folder."""
+    with client_of(tmp_path) as client:
+        yield client
 
 
 @pytest.fixture(autouse=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import shutil
 import ssl
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 
 from isiw.server import Rules, make_app
 from isiw.server.app import Server, listening, settings_of
@@ -23,6 +25,9 @@ TOKEN = "a token for the tests"  # noqa: S105 - of the tests
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
 NOBODY = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 """Trusts nobody, and is ready at once: for each client without it, all the world's authorities are read."""
+
+OPENSSL = shutil.which("openssl") or ""
+WITH_OPENSSL = pytest.mark.skipif(not OPENSSL, reason="needs openssl, to make a certificate")
 
 SPACE = {"low_ms": 0, "high_ms": 200, "reference": "impact"}
 SETTINGS = {"max_trials": 6, "particles": 10}
@@ -41,6 +46,15 @@ SEVERAL: dict[str, Any] = {
     "limits": {"min_iti_s": 0.0, "max_intensity_pct_rmt": 110},
 }
 """A plan whose pairs have two intensities in turn."""
+
+
+def certified(folder: Path) -> tuple[Path, Path]:
+    """A certificate of this computer, of its own making, and its key."""
+    certificate, key = folder / "certificate.pem", folder / "key.pem"
+    command = [OPENSSL, "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=isiw"]
+    files = ["-keyout", str(key), "-out", str(certificate), "-addext", "subjectAltName=IP:127.0.0.1"]
+    subprocess.run([*command, *files], check=True, capture_output=True)  # noqa: S603 - our own command
+    return certificate, key
 
 
 @contextmanager

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +16,6 @@ from isiw.log.record import read_session
 from server.serving import BEARER, NOBODY, PLAN, client_of, created, done, mep_mv, refused, server
 
 PAUSE_S = 0.3
-
-
-@pytest.fixture
-def client(tmp_path: Path) -> Iterator[httpx.Client]:
-    with client_of(tmp_path) as client:
-        yield client
 
 
 @pytest.fixture

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import http.client
 import json
-import shutil
 import socket
 import ssl
-import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -20,10 +18,10 @@ import pytest
 from isiw.server.guard import Connection
 from isiw.server.live.page import file_of
 from server.live.watched import Watched
-from server.serving import BEARER, NOBODY, client_of, done, refused, server
+from server.serving import BEARER, NOBODY, WITH_OPENSSL, certified, client_of, done, refused, server
+from waiting import until
 
 HALF = b"GET /sessions HTTP/1.1\r\nX: "
-OPENSSL = shutil.which("openssl") or ""
 IN_TIME_S = 1.0
 
 
@@ -55,13 +53,6 @@ def answer_on(connection: socket.socket) -> tuple[int, dict[str, dict[str, str]]
     content: dict[str, dict[str, str]] = json.loads(response.read())
     assert connection.recv(1) == b""
     return response.status, content
-
-
-def until(holds: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + 10
-    while not holds():
-        assert time.monotonic() < end_s, "it took too long"
-        time.sleep(0.01)
 
 
 def port_of(client: httpx.Client) -> int:
@@ -198,12 +189,9 @@ def test_who_reads_nothing_is_not_sent_a_whole_file_at_once(tmp_path: Path, monk
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not OPENSSL, reason="needs openssl, to make a certificate")
+@WITH_OPENSSL
 def test_handshakes_that_are_never_finished_keep_nobody_out(tmp_path: Path) -> None:
-    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
-    command = [OPENSSL, "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=isiw"]
-    files = ["-keyout", str(key), "-out", str(certificate), "-addext", "subjectAltName=IP:127.0.0.1"]
-    subprocess.run([*command, *files], check=True, capture_output=True)  # noqa: S603 - our own command
+    certificate, key = certified(tmp_path)
     options = ("--certificate", str(certificate), "--key", str(key))
     with server(tmp_path / "logs", *options) as (_, url), ExitStack() as stack:
         port = httpx.URL(url).port or 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import signal
 import ssl
 import subprocess
@@ -19,9 +18,19 @@ from isiw.cli import app
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.record import read_session
 from isiw.server import ServerSettings
-from server.serving import BEARER, NOBODY, SEVERAL, client_of, created, done, refused, server, told
-
-OPENSSL = shutil.which("openssl") or ""
+from server.serving import (
+    BEARER,
+    NOBODY,
+    SEVERAL,
+    WITH_OPENSSL,
+    certified,
+    client_of,
+    created,
+    done,
+    refused,
+    server,
+    told,
+)
 
 
 def client_at(url: str) -> httpx.Client:
@@ -166,12 +175,9 @@ def test_others_may_ask_only_with_tls(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not OPENSSL, reason="needs openssl, to make a certificate")
+@WITH_OPENSSL
 def test_with_a_certificate_it_is_served_by_tls_alone(tmp_path: Path) -> None:
-    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
-    command = [OPENSSL, "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=isiw"]
-    files = ["-keyout", str(key), "-out", str(certificate), "-addext", "subjectAltName=IP:127.0.0.1"]
-    subprocess.run([*command, *files], check=True, capture_output=True)  # noqa: S603 - our own command
+    certificate, key = certified(tmp_path)
     with server(tmp_path / "logs", "--certificate", str(certificate), "--key", str(key)) as (_, url):
         assert url.startswith("https://")
         context = ssl.create_default_context(cafile=str(certificate))

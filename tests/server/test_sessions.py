@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Never
 
@@ -26,12 +25,6 @@ from isiw.session.examination import Examination
 from isiw.strategy.catalogue import make_strategy
 from isiw.summary import IN_DOUBT, JUDGED_SINCE, TOO_FEW
 from server.serving import PLAN, SETTINGS, SEVERAL, SPACE, client_of, created, done, mep_mv, refused, told
-
-
-@pytest.fixture
-def client(tmp_path: Path) -> Iterator[httpx.Client]:
-    with client_of(tmp_path) as client:
-        yield client
 
 
 @pytest.fixture

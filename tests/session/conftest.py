@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,14 @@ from isiw.session import pausing
 def log(tmp_path: Path) -> Path:
     """Where the log of a session comes to."""
     return tmp_path / "s.mcap"
+
+
+@pytest.fixture
+def terminal() -> Iterator[None]:
+    """A terminal whose closing is heard, also where the tests themselves run under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
 
 
 @pytest.fixture(autouse=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from isiw.log.record import SessionRecord, read_session
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.resume import resume
+from logs import blocks_of, damage
 from scripted import ScriptedDevice, scripted_strategy
 from session.crashes import Disk
 
@@ -75,17 +75,14 @@ def one_trial(bench: Bench) -> None:
 
 def killed(bench: Bench) -> None:
     one_trial(bench)
-    whole = bench.log.read_bytes()
-    end = max(match.start() for match in re.finditer(rb"\x04\x00\x00\x00zstd", whole[: whole.rindex(b"\x0f")]))
-    bench.log.with_name("s.mcap.part").write_bytes(whole[: end - 37])
+    last, _ = blocks_of(bench.log)[-1]
+    bench.log.with_name("s.mcap.part").write_bytes(bench.log.read_bytes()[:last])
     bench.log.unlink()
 
 
 def damaged(bench: Bench) -> None:
     one_trial(bench)
-    whole = bytearray(bench.log.read_bytes())
-    whole[[match.start() for match in re.finditer(rb"\x04\x00\x00\x00zstd", whole)][2] + 60] ^= 1
-    bench.log.write_bytes(whole)
+    damage(bench.log, 2)
 
 
 SCENARIOS: dict[str, tuple[Callable[[Bench], Any], Callable[[Bench], Any]]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Never
 
@@ -27,14 +27,6 @@ from known import known
 from scripted import ScriptedDevice, scripted_strategy, told_to
 
 TESTS = Path(__file__).parents[1]
-
-
-@pytest.fixture
-def released() -> Iterator[threading.Event]:
-    """What hangs, hangs until this is set, at the end of the test."""
-    event = threading.Event()
-    yield event
-    event.set()
 
 
 def refusing(refusals: int, error: Exception | None = None) -> Callable[[Stimulus], Measurement]:
@@ -91,15 +83,15 @@ def test_a_device_that_goes_on_refusing_ends_the_session_and_it_can_be_resumed(l
     assert [trial.told for trial in resumed.trials] == [True] * 4
 
 
-def test_a_device_that_cannot_be_staged_is_stopped_and_leaves_no_log_in_the_way(
-    log: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    device = ScriptedDevice()
+class Airless(ScriptedDevice):
+    """Cannot be staged."""
 
-    def stage() -> Never:
+    def stage(self) -> Never:
         raise DeviceError("no air pressure")
 
-    monkeypatch.setattr(device, "stage", stage)
+
+def test_a_device_that_cannot_be_staged_is_stopped_and_leaves_no_log_in_the_way(log: Path) -> None:
+    device = Airless()
     with pytest.raises(DeviceError, match="no air pressure"):
         Session(device, scripted_strategy(), log=log).run()
     assert device.calls == ["stop", "unstage"]
@@ -107,17 +99,11 @@ def test_a_device_that_cannot_be_staged_is_stopped_and_leaves_no_log_in_the_way(
     assert len(Session(ScriptedDevice(), scripted_strategy(3), log=log).run().trials) == 3
 
 
-def test_a_resumption_that_cannot_be_staged_leaves_its_log(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_resumption_that_cannot_be_staged_leaves_its_log(log: Path) -> None:
     with pytest.raises(NotDelivered):
         Session(ScriptedDevice(refusing(99)), scripted_strategy(4), log=log).run()
-    device = ScriptedDevice()
-
-    def stage() -> Never:
-        raise DeviceError("no air pressure")
-
-    monkeypatch.setattr(device, "stage", stage)
     with pytest.raises(DeviceError, match="no air pressure"):
-        resume(log, device, scripted_strategy(4)).run()
+        resume(log, Airless(), scripted_strategy(4)).run()
     assert "no air pressure" in read_session(log).events[-1].text
 
 

@@ -4,7 +4,6 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
 from typing import Never
 
 import pytest
@@ -13,14 +12,7 @@ from isiw.session.pausing import Interrupts
 
 if os.name == "nt":
     pytest.skip("POSIX signals", allow_module_level=True)
-
-
-@pytest.fixture(autouse=True)
-def terminal() -> Iterator[None]:
-    """A terminal whose closing is heard, also where the tests themselves run under nohup."""
-    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
-    yield
-    signal.signal(signal.SIGHUP, before)
+pytestmark = pytest.mark.usefixtures("terminal")
 
 
 def nothing() -> None:

@@ -8,7 +8,8 @@ import shutil
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -232,11 +233,7 @@ def test_the_blocks_after_a_restart_are_due_when_they_were_whatever_the_clock_wa
     clock.time_s += 15.0
     clock.set_by_s = set_by_s
     again = resume(
-        log,
-        device(simulated=False),
-        knowing(),
-        clock=FarClock(clock),
-        safeguards=Safeguards(on_pause=lambda _: True),
+        log, device(simulated=False), knowing(), clock=FarClock(clock), safeguards=Safeguards(on_pause=lambda _: True)
     )
     again.run()
     record = read_session(log)
@@ -296,6 +293,17 @@ def test_who_looks_on_gets_nothing_that_shows_the_arm(log: Path, arm: Arm) -> No
     assert {trial.index for trial in one.shown_trials}.isdisjoint(PAIRS)
 
 
+@contextmanager
+def up_to_date() -> Iterator[None]:
+    """Within, a page that nobody has open shows all at once, and no block waits for somebody."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(View, "is_attended", lambda _: False)
+        patched.setattr("isiw.session.blocks.Blocks.announcement", lambda *_: None)
+        patched.setattr("isiw.server.live.view.UPDATE_S", 0.0)
+        patched.setattr("isiw.server.live.view.SHARE", 1e9)
+        yield
+
+
 def _shown(log: Path, arm: Arm, capsys: pytest.CaptureFixture[str]) -> tuple[str, list[str]]:
     """What the console prints, and what the live page shows after each trial that it hears of."""
     page: list[str] = []
@@ -307,11 +315,7 @@ def _shown(log: Path, arm: Arm, capsys: pytest.CaptureFixture[str]) -> tuple[str
 
     one.follow(view)
     one._sink.on_trial = looking  # noqa: SLF001 - while it is followed
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(type(view), "is_attended", lambda _: False)
-        patched.setattr("isiw.session.blocks.Blocks.announcement", lambda *_: None)
-        patched.setattr("isiw.server.live.view.UPDATE_S", 0.0)
-        patched.setattr("isiw.server.live.view.SHARE", 1e9)
+    with up_to_date():
         one.run(progress=True)
     page.append(view.shown().json)
     return capsys.readouterr().out, page
@@ -343,11 +347,7 @@ def test_the_live_page_counts_what_is_left_while_pairs_are_concealed(log: Path) 
 
     rig.answer = answer
     one.follow(view)
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(type(view), "is_attended", lambda _: False)
-        patched.setattr("isiw.session.blocks.Blocks.announcement", lambda *_: None)
-        patched.setattr("isiw.server.live.view.UPDATE_S", 0.0)
-        patched.setattr("isiw.server.live.view.SHARE", 1e9)
+    with up_to_date():
         one.run()
     assert {trial: page["left"] for trial, page in pages.items()} == {trial: 59 - trial for trial in pages}
     assert {trial: page["hides"] for trial, page in pages.items()} == {2: False, 20: True, 52: True, 55: False}

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from disks import HAPPENINGS
 from isiw.devices.info import DeviceInfo
 from isiw.errors import LogError
 from isiw.log.record import read_session
@@ -29,24 +28,20 @@ def log(tmp_path: Path) -> Path:
     return tmp_path / "folder" / "s.mcap"
 
 
-HAPPENINGS: dict[str, Callable[[Path], object]] = {
-    "deleted": lambda part: part.unlink(),
-    "moved": lambda part: part.rename(part.with_name("elsewhere")),
-    "its folder deleted": lambda part: shutil.rmtree(part.parent),
-    "its folder moved": lambda part: part.parent.rename(part.parent.with_name("elsewhere")),
-    "shortened": lambda part: os.truncate(part, 4000),
-    "replaced": lambda part: shutil.copy(part, f"{part}.copy") and part.with_name(f"{part.name}.copy").replace(part),
-}
+def taking_away(log: Path, happening: str) -> ScriptedDevice:
+    """A device during whose third delivery something happens to the log."""
 
-
-@pytest.mark.parametrize("happening", HAPPENINGS)
-def test_a_log_that_is_gone_stops_the_session_before_the_next_stimulus(log: Path, happening: str) -> None:
     def answer(stimulus: Stimulus) -> Measurement:
         if stimulus.trial == 2:
             HAPPENINGS[happening](log.with_name("s.mcap.part"))
         return Measurement(0.1, stimulus.isi_ms)
 
-    device = ScriptedDevice(answer)
+    return ScriptedDevice(answer)
+
+
+@pytest.mark.parametrize("happening", HAPPENINGS)
+def test_a_log_that_is_gone_stops_the_session_before_the_next_stimulus(log: Path, happening: str) -> None:
+    device = taking_away(log, happening)
     with pytest.raises(LogError, match="as it was written"):
         Session(device, scripted_strategy(9), log=log).run()
     assert len(device.delivered) == 3
@@ -55,13 +50,8 @@ def test_a_log_that_is_gone_stops_the_session_before_the_next_stimulus(log: Path
 
 @pytest.mark.parametrize("happening", ["deleted", "moved", "its folder deleted", "its folder moved"])
 def test_what_the_session_held_of_its_log_is_saved_and_can_be_resumed(log: Path, happening: str) -> None:
-    def answer(stimulus: Stimulus) -> Measurement:
-        if stimulus.trial == 2:
-            HAPPENINGS[happening](log.with_name("s.mcap.part"))
-        return Measurement(0.1, stimulus.isi_ms)
-
     with pytest.raises(LogError, match=r"s\.rescued\.mcap"):
-        Session(ScriptedDevice(answer), scripted_strategy(9), log=log).run()
+        Session(taking_away(log, happening), scripted_strategy(9), log=log).run()
     saved = log.with_name("s.rescued.mcap")
     record = read_session(saved)
     assert record.finished

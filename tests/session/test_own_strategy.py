@@ -40,22 +40,14 @@ def test_a_strategy_that_was_told_beside_the_session_chooses_no_isi(
     assert [len(read_session(log).intents), len(read_session(log).table)] == [1, 1]
 
 
-def test_an_isi_is_not_even_repeated_by_a_strategy_that_was_told_beside_the_session(log: Path) -> None:
+def test_an_outcome_that_was_told_twice_is_logged_once_and_its_isi_is_not_repeated(log: Path) -> None:
     strategy = scripted_strategy(9)
     with open_session(strategy, log) as session:
         isi_ms = session.ask()
         strategy.tell(isi_ms, 0.1)
-        with pytest.raises(StrategyError, match="one of them twice"):
-            session.ask()
-
-
-def test_an_outcome_that_was_told_twice_is_logged_once_and_found(log: Path) -> None:
-    strategy = scripted_strategy(9)
-    with open_session(strategy, log) as session:
-        isi_ms = session.ask()
-        strategy.tell(isi_ms, 0.1)
-        with pytest.raises(StrategyError, match="one of them twice"):
-            session.tell(isi_ms, 0.1)
+        for call in (session.ask, lambda: session.tell(isi_ms, 0.1)):
+            with pytest.raises(StrategyError, match="one of them twice"):
+                call()
     assert [trial.mep_mv for trial in read_session(log).table] == [0.1]
     with open_session(scripted_strategy(9), log, resume=True) as resumed:
         assert resumed.strategy.delivered == 1

@@ -175,7 +175,7 @@ def test_mistrials_count_with_their_reason_and_are_asked_again(log: Path) -> Non
         session.mistrial("the person laughed")
     record = read_session(log)
     assert [trial.reason for trial in record.table] == [Kind.NO_IMPACT, Kind.REJECTED]
-    assert [(event.kind, event.text) for event in record.events] == [("note", "the person laughed")]
+    assert [(event.kind, event.trial, event.text) for event in record.events] == [("note", 1, "the person laughed")]
 
 
 def test_three_mistrials_in_a_row_are_a_warning(log: Path) -> None:
@@ -738,14 +738,6 @@ def test_tms_alone_that_was_refused_can_be_told_rightly(log: Path) -> None:
         session.tell(None, 0.06)
         run(session, 1)
     assert [trial.mep_mv for trial in read_session(log).table][:1] == [0.06]
-
-
-def test_a_reason_in_own_words_is_noted_under_its_trial(log: Path) -> None:
-    with open_session(scripted_strategy(9), log) as session:
-        session.ask()
-        session.mistrial("the coil slipped")
-    (note,) = read_session(log).events
-    assert (note.kind, note.trial, note.text) == ("note", 0, "the coil slipped")
 
 
 def test_a_trial_whose_writing_was_interrupted_once_it_was_in_the_log_is_not_asked_again(

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -35,7 +34,7 @@ from isiw.trials import Stimulus
 from isiw.visit import VisitProtocol
 from known import known
 from log.written import make_header
-from logs import cut_after
+from logs import cut_after, damage
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 
 
@@ -80,15 +79,6 @@ def test_resuming_twice_is_no_different(interrupted: Path, uninterrupted: list[f
         resume(interrupted, ScriptedDevice(), scripted_strategy(10), on_trial=stop_after(7)).run()
     result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert [trial.commanded_isi_ms for trial in result.trials] == uninterrupted
-
-
-def test_resuming_a_finished_session_delivers_nothing(log: Path) -> None:
-    Session(ScriptedDevice(), scripted_strategy(3), log=log).run()
-    device = ScriptedDevice()
-    result = resume(log, device, scripted_strategy(3)).run()
-    assert device.delivered == []
-    assert result.decision.stop
-    assert len(read_session(log).table) == 3
 
 
 def kill_during_trial_4(log: Path, isi_ms: float | None) -> None:
@@ -251,9 +241,7 @@ def test_rests_that_limit_nothing_are_refused_where_they_are_stated_and_go_on_fr
     assert {name: getattr(header, name) for name in part} == part
 
 
-def test_the_first_stimulus_after_resuming_waits_a_whole_interval(
-    interrupted: Path,
-) -> None:
+def test_the_first_stimulus_after_resuming_waits_a_whole_interval(interrupted: Path) -> None:
     resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
     assert read_session(interrupted).intents[4].t_s == 5.0
 
@@ -268,9 +256,7 @@ def test_another_strategy_is_refused_before_anything_happens(interrupted: Path) 
     assert interrupted.read_bytes() == before
 
 
-def test_without_verification_the_logged_trials_are_told_as_they_are(
-    interrupted: Path,
-) -> None:
+def test_without_verification_the_logged_trials_are_told_as_they_are(interrupted: Path) -> None:
     result = resume(interrupted, ScriptedDevice(), scripted_strategy(10, seed=1), verify=False).run()
     assert len(result.trials) == 10
 
@@ -379,17 +365,8 @@ def test_only_a_trial_that_counts_can_be_excluded(interrupted: Path, trial: int)
         exclude(interrupted, trial, "because")
 
 
-def test_a_trial_is_excluded_once(interrupted: Path) -> None:
-    exclude(interrupted, 1, "sneezed")
-    with pytest.raises(InvalidValueError, match="cannot exclude this trial"):
-        exclude(interrupted, 1, "sneezed")
-
-
 def lose_trial_1(log: Path) -> None:
-    whole = bytearray(log.read_bytes())
-    blocks = [at for at in range(len(whole)) if whole.startswith(b"\x04\x00\x00\x00zstd", at)]
-    whole[blocks[5] + 40] ^= 0xFF  # header, then intent, trial, estimate of each trial: the trial of number 1
-    log.write_bytes(whole)
+    damage(log, 5)  # header, then intent, trial, estimate of each trial: the trial of number 1
     assert [intent.trial for intent in read_session(log).unknown] == [1]
 
 
@@ -426,9 +403,7 @@ def test_what_was_asked_before_an_exclusion_is_compared_as_it_was_asked(
     assert again.trials == result.trials
 
 
-def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(
-    interrupted: Path,
-) -> None:
+def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(interrupted: Path) -> None:
     with LogWriter.continuing(interrupted, salvage(interrupted), read_session(interrupted).header) as writer:
         writer.append(Intent(trial=5, isi_ms=77.0))  # intent and trial 4 are lost; what was told of it is not known
     result = resume(interrupted, ScriptedDevice(), scripted_strategy(10)).run()
@@ -603,10 +578,7 @@ def test_a_log_with_its_end_has_lost_no_pulses(interrupted: Any) -> None:
 
 
 def test_excluding_a_trial_of_a_damaged_log_says_in_the_log_what_was_lost(interrupted: Any) -> None:
-    whole = bytearray(interrupted.read_bytes())
-    block = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", whole)][6]
-    whole[block + 30] ^= 1
-    interrupted.write_bytes(whole)
+    damage(interrupted, 6)
     exclude(interrupted, 0, "sneezed")
     assert "fails its checksum" in next(e.text for e in read_session(interrupted).events if "checksum" in e.text)
 

@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -25,18 +25,10 @@ from isiw.sweeps import Measurement
 from isiw.trials import Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 
-pytestmark = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+pytestmark = [pytest.mark.skipif(os.name == "nt", reason="POSIX signals"), pytest.mark.usefixtures("terminal")]
 
 TESTS = Path(__file__).parents[1]
 HANG_S = 20.0  # what hangs is interrupted at once; where it is not, the test fails after this time
-
-
-@pytest.fixture(autouse=True)
-def terminal() -> Iterator[None]:
-    """A terminal whose closing is heard, also where the tests themselves run under nohup."""
-    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
-    yield
-    signal.signal(signal.SIGHUP, before)
 
 
 def goes_on_after(reasons: list[str]) -> Callable[[str], bool]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import shutil
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from isiw.session import ThresholdRecorder, open_session, open_threshold, read_t
 from isiw.session.threshold import search_of
 from isiw.strategy.threshold import IntensityRange, MaximumLikelihood, ThresholdSearch, make_threshold_search
 from isiw.studies.threshold import open_simulated, run_simulated
+from logs import damage
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy
 
 SIMULATED = DeviceInfo("nobody", "impact", simulated=True)
@@ -103,11 +103,8 @@ def test_a_pulse_without_an_outcome_counts_and_is_not_learnt(log: Path) -> None:
 def test_pulses_that_a_damaged_log_has_lost_count(log: Path) -> None:
     with opened(log) as recorder:
         answer(recorder, 4)
-    content = bytearray(log.read_bytes())
-    blocks = [*re.finditer(b"\x04\x00\x00\x00zstd", content)]  # a header, then intent, outcome and belief of each
-    for block in blocks[10:13]:
-        content[block.end() + 20] ^= 0xFF
-    log.write_bytes(content)
+    for block in range(10, 13):  # a header, then intent, outcome and estimate of each
+        damage(log, block)
     assert len(read_threshold(log).losses) >= 3
     with resume_threshold(log) as resumed:
         assert resumed.given == 4

@@ -254,11 +254,7 @@ def short_before_the_pulse(stimulus: Stimulus) -> Sweep:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("answer", "trials", "found"),
-    [
-        (moving, 8, []),
-        (firing_six_times, 24, [Kind.STOPPED]),
-        (short_before_the_pulse, 4, [Kind.TOO_LITTLE_REST]),
-    ],
+    [(moving, 8, []), (firing_six_times, 24, [Kind.STOPPED]), (short_before_the_pulse, 4, [Kind.TOO_LITTLE_REST])],
 )
 def test_what_is_wrong_with_a_rig_that_returns_sweeps_pauses_it_once_and_a_movement_does_not(
     answer: Callable[[Stimulus], Sweep], trials: int, found: list[Kind], log: Path

@@ -62,8 +62,5 @@ def sweep_of(**changes: Any) -> Sweep:
     acceleration = 0.3 * rng.standard_normal(5000)
     acceleration[(time_ms >= 630) & (time_ms < 680)] += 15.0
     acceleration[(time_ms >= 680) & (time_ms < 695)] -= 50.0
-    channels = {
-        "emg": Channel(emg, RATE_HZ, "mV"),
-        "acceleration": Channel(acceleration, RATE_HZ, "m/s^2"),
-    }
+    channels = {"emg": Channel(emg, RATE_HZ, "mV"), "acceleration": Channel(acceleration, RATE_HZ, "m/s^2")}
     return replace(Sweep(channels, t_valve_ms=500.0, t_tms_ms=780.0), **changes)

@@ -7,14 +7,7 @@ from hypothesis import strategies as st
 
 from isiw.devices.robot.waveforms import mep_shape
 from isiw.errors import InvalidValueError
-from isiw.signals import (
-    background_rms,
-    mep_amplitude,
-    mep_amplitudes,
-    mep_onset,
-    mep_onsets,
-    mep_present,
-)
+from isiw.signals import background_rms, mep_amplitude, mep_amplitudes, mep_onset, mep_onsets, mep_present
 from isiw.types import FloatArray
 
 RATE_HZ = 5000.0
@@ -33,11 +26,7 @@ def test_the_amplitude_is_that_of_the_mep(amplitude_mv: float) -> None:
     np.testing.assert_allclose(measured, amplitude_mv, atol=0.005)
 
 
-@given(
-    offset=st.floats(-5, 5),
-    gain=st.floats(0.1, 10),
-    sign=st.sampled_from((-1, 1)),
-)
+@given(offset=st.floats(-5, 5), gain=st.floats(0.1, 10), sign=st.sampled_from((-1, 1)))
 def test_offset_and_polarity_do_not_matter_and_gain_is_proportional(offset: float, gain: float, sign: float) -> None:
     emg = emg_with_mep(0.1)[0]
     expected = gain * mep_amplitude(emg, RATE_HZ, 150.0)

@@ -154,9 +154,7 @@ def test_a_prior_is_a_table_or_the_object_that_it_stands_for() -> None:
     table = make_strategy(prior={"profile": {"p_window": 0.6}, "switch": {"reliability": [0.5, 0.4]}}, **FEW)
     prior = Prior()
     prior = replace(
-        prior,
-        profile=replace(prior.profile, p_window=0.6),
-        switch=replace(prior.switch, reliability=Scale(0.5, 0.4)),
+        prior, profile=replace(prior.profile, p_window=0.6), switch=replace(prior.switch, reliability=Scale(0.5, 0.4))
     )
     assert make_strategy(prior=prior, **FEW).model == table.model
 

@@ -22,7 +22,7 @@ FIVE = DesignSpace(0, 4, reference="impact")
 
 @dataclass(frozen=True)
 class Scores:
-    """An acquisition function that gives the same scores whatever is believed."""
+    """An acquisition function that gives the same scores whatever the posterior."""
 
     values: Array
     needs: tuple[type, ...] = ()

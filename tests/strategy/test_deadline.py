@@ -1,5 +1,4 @@
 import threading
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Never
@@ -44,16 +43,9 @@ class Broken:
 
 
 @pytest.fixture
-def go() -> Iterator[threading.Event]:
-    event = threading.Event()
-    yield event
-    event.set()
-
-
-@pytest.fixture
-def held_up(go: threading.Event) -> Strategy:
+def held_up(released: threading.Event) -> Strategy:
     usual = scripted_strategy()
-    return Strategy(usual.space, usual.model, HeldUp(go), Budget(2))
+    return Strategy(usual.space, usual.model, HeldUp(released), Budget(2))
 
 
 def test_past_the_deadline_an_isi_of_the_grid_is_asked_with_the_reason(held_up: Strategy) -> None:
@@ -62,9 +54,9 @@ def test_past_the_deadline_an_isi_of_the_grid_is_asked_with_the_reason(held_up: 
     assert "0.01 s" in known(held_up.fallback_reason)
 
 
-def test_the_fallback_stays_until_the_next_tell_and_no_longer(held_up: Strategy, go: threading.Event) -> None:
+def test_the_fallback_stays_until_the_next_tell_and_no_longer(held_up: Strategy, released: threading.Event) -> None:
     first = held_up.ask(deadline_s=0.01)
-    go.set()
+    released.set()
     assert held_up.ask() == first
     assert held_up.fallback_reason is not None
     held_up.tell(first, 0.02)
@@ -81,15 +73,17 @@ def test_fallbacks_differ_from_trial_to_trial(held_up: Strategy) -> None:
     assert len(set(asked)) == 4
 
 
-def test_within_the_deadline_the_choice_is_the_usual_one(held_up: Strategy, go: threading.Event) -> None:
-    go.set()
+def test_within_the_deadline_the_choice_is_the_usual_one(held_up: Strategy, released: threading.Event) -> None:
+    released.set()
     assert held_up.ask(deadline_s=30.0) == 40.0
     assert held_up.fallback_reason is None
 
 
 @pytest.mark.parametrize("deadline_s", [float("inf"), 1e300])
-def test_a_deadline_that_never_comes_is_none(held_up: Strategy, go: threading.Event, deadline_s: float | None) -> None:
-    go.set()
+def test_a_deadline_that_never_comes_is_none(
+    held_up: Strategy, released: threading.Event, deadline_s: float | None
+) -> None:
+    released.set()
     assert held_up.ask(deadline_s=deadline_s) == 40.0
     assert held_up.fallback_reason is None
 

@@ -20,17 +20,7 @@ import pytest
 from disks import no_room
 from isiw import files
 from isiw.errors import ConfigError, InvalidValueError, StudyError
-from isiw.studies import (
-    Processes,
-    Study,
-    StudyStrategy,
-    conduct,
-    load_study,
-    open_store,
-    replay,
-    run_unit,
-    sessions,
-)
+from isiw.studies import Processes, Study, StudyStrategy, conduct, load_study, open_store, replay, run_unit, sessions
 from isiw.studies import plan as plan_module
 from isiw.studies import running as running_module
 from isiw.studies import store as store_module

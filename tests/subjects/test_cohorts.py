@@ -419,10 +419,7 @@ def curve(subject: SimulatedSubject) -> RecruitmentResponse:
 @pytest.mark.parametrize("name", LABS)
 def test_the_people_of_a_lab_have_its_law(name: str) -> None:
     law, drawn = lab(name, 3), people(name)
-    normal = {
-        law.start_ms: [peak(s).start_ms for s in drawn],
-        law.hit_delay_ms: [s.hit_delay_ms for s in drawn],
-    }
+    normal = {law.start_ms: [peak(s).start_ms for s in drawn], law.hit_delay_ms: [s.hit_delay_ms for s in drawn]}
     for (mean, sd), values in normal.items():
         assert stats.kstest(values, stats.norm(mean, sd).cdf).pvalue > KS_LEVEL
     assert_clipped_log_normal([peak(s).width_ms for s in drawn], *law.width_ms, (40, 230))

@@ -18,10 +18,6 @@ PEOPLE = cohort("kim11-measured", 11, 0)
 EVERYBODY = range(11)
 
 
-def test_the_widths_are_those_of_table_4_1() -> None:
-    assert WIDTHS_KIM_MS == (75, 65, 80, 70, 110, 120, 220, 145, 135, 110, 60)
-
-
 @pytest.mark.parametrize("index", EVERYBODY)
 def test_the_expected_mep_is_above_that_of_tms_alone_at_rmt_inside_the_window(index: int) -> None:
     person, response = PEOPLE[index], MEASURED_KIM[index].response()

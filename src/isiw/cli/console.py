@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import os
 import signal
-import sys
 import threading
 import time
 import traceback
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from isiw.log.record import SessionRecord
 
 _SILENT_S = 1.5
-_AGAIN_S = 0.05
 
 DAMAGED = 3
 NOT_OVER = 5  # a session that a person should look at, or that its operator ended early
@@ -147,25 +145,14 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Within, Ctrl-C is a KeyboardInterrupt, also one that comes while a compiler calls Python, which would lose it."""
+    """Within, Ctrl-C is a KeyboardInterrupt."""
     if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         yield
         return
-    handler, hook = signal.signal(signal.SIGINT, signal.default_int_handler), sys.unraisablehook
-
-    def again(lost: sys.UnraisableHookArgs) -> None:
-        if not issubclass(lost.exc_type, KeyboardInterrupt):
-            hook(lost)
-            return
-        later = threading.Timer(_AGAIN_S, signal.raise_signal, (signal.SIGINT,))  # when the callback has returned
-        later.daemon = True
-        later.start()
-
-    sys.unraisablehook = again
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
     finally:
-        sys.unraisablehook = hook
         signal.signal(signal.SIGINT, handler or signal.SIG_DFL)  # None if it was not set by Python
 
 

@@ -34,10 +34,7 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "isi_ms": ("ms", "the realised ISI"),
     "isi_sd_ms": ("ms", "SD of the realised ISI; 0 if it was measured"),
     "mep_mv": ("mV", "peak-to-peak amplitude of the MEP; 0 is below the detection limit"),
-    "mep_sd_mv": (
-        "mV",
-        "SD of the amplitude, as what {0.one} alone evokes varies",
-    ),
+    "mep_sd_mv": ("mV", "SD of the amplitude, as what {0.one} alone evokes varies"),
     "tap_mv": ("mV", "what is left in it of what {0.one} alone evokes, in the mean; empty if that is not known"),
     "mep_onset_ms": ("ms", "onset of the MEP after the magnetic pulse; empty without a sweep or an MEP"),
     "mep_duration_ms": ("ms", "from its onset to its end"),

@@ -38,9 +38,7 @@ def require_free(target: Path) -> None:
             raise LogError(f"no log can be here: there is {other}", got=str(existing), remedy="Choose another path.")
         if existing.exists():
             raise LogError(
-                "there is a log already, and it is never overwritten",
-                got=str(existing),
-                remedy=_way_on(existing),
+                "there is a log already, and it is never overwritten", got=str(existing), remedy=_way_on(existing)
             )
         if (same := twin(existing)) is not None:
             raise LogError(

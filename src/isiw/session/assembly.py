@@ -62,12 +62,7 @@ def require_known(call: str, options: Mapping[str, Any], kind: type) -> None:
         raise TypeError(f"{call}() got an unexpected keyword argument {min(unknown)!r}")
 
 
-_OPTIONAL_PARTS: Final = {
-    "limits": Limits,
-    "visit": Visit,
-    "protocol": VisitProtocol,
-    "intervention": Intervention,
-}
+_OPTIONAL_PARTS: Final = {"limits": Limits, "visit": Visit, "protocol": VisitProtocol, "intervention": Intervention}
 
 
 def require_parts(log: object, options: Mapping[str, Any] = MappingProxyType({}), **parts: tuple[object, type]) -> Path:

@@ -196,9 +196,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             )
 
     def conclude(
-        self,
-        decide: Callable[[], StopDecision] | None = None,
-        ask_next: Callable[[], float | None] = lambda: None,
+        self, decide: Callable[[], StopDecision] | None = None, ask_next: Callable[[], float | None] = lambda: None
     ) -> Known | None:
         """Learn what is not learnt yet, and log what is known then, as `log_estimate` does; None if all was learnt."""
         trial = self.unconcluded
@@ -232,11 +230,9 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             self.event("doubt", f"{doubt}", finding=doubt.kind)
 
     def log_estimate(
-        self,
-        decide: Callable[[], StopDecision] | None = None,
-        ask_next: Callable[[], float | None] = lambda: None,
+        self, decide: Callable[[], StopDecision] | None = None, ask_next: Callable[[], float | None] = lambda: None
     ) -> Known:
-        """Log, if the log is open, what is known after the last trial, whether to stop, and else what is asked next."""
+        """Log, if the log is open, what is known after the last trial, whether to stop, and else the next ISI."""
         decision = self._freely(decide or self.learner.decision)
         known = Known(decision, None if decision.stop else ask_next())
         if self._sink.is_open:

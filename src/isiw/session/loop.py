@@ -38,7 +38,7 @@ class Session(Judging):
 
     Args:
         device: delivers the stimuli; its ISIs count from the same event as the strategy's space.
-        strategy: proposes ISIs and learns.
+        strategy: chooses ISIs and learns.
         log: where the log will be; must not exist yet.
         earlier: where an earlier run ended; `isiw.resume` says so.
         limits: what may be delivered; the strategy's space, 5 s between stimuli and 200 pulses by default.

@@ -94,7 +94,7 @@ class Recorder(Recording[Trial], Judging):
     """A session whose loop is the lab's own; `isiw.open_session` opens one. As a context manager it closes its log.
 
     Args:
-        strategy: proposes ISIs and learns.
+        strategy: chooses ISIs and learns.
         log: the open log.
         header: what the session is: its limits and its protocol.
         clock: tells the time, and waits.

@@ -59,11 +59,7 @@ class Replayed(NamedTuple):
 
 
 def replay(
-    record: SessionRecord,
-    strategy: Strategy,
-    *,
-    verify: bool = True,
-    replayed: Callable[[int], None] = lambda _: None,
+    record: SessionRecord, strategy: Strategy, *, verify: bool = True, replayed: Callable[[int], None] = lambda _: None
 ) -> Replayed:
     """Let a strategy learn everything that a log holds, in the order in which it was learnt then.
 

@@ -56,7 +56,7 @@ def open_session(
     """Open a session whose loop is your own: ask it for ISIs, and tell it what came of them.
 
     Args:
-        strategy: proposes ISIs and learns; of a session that is resumed, made with the same settings and seed.
+        strategy: chooses ISIs and learns; of a session that is resumed, made with the same settings and seed.
         log: where the log is; it must not exist yet, unless the session is resumed.
         resume: whether to continue the log if there is one. A trial without an outcome in it becomes a mistrial.
         earlier: trials of this person that were delivered before, such as the `record.table` of a log or an analysis:

@@ -27,7 +27,7 @@ class SessionUpdate:
         trial: the trial.
         estimate: the window's estimate.
         decision: whether the session stops here, and why.
-        next_isi_ms: what is asked next [ms]; None if the session stops, or a control trial comes next.
+        next_isi_ms: the next ISI [ms]; None if the session stops, or a control trial comes next.
         stimuli_left: how many stimuli the budget and the limits still allow.
         left_s: about how long so many take at the pace of the last ones, rests and control trials among them [s]; None
             before there is a pace.

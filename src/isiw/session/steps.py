@@ -270,7 +270,7 @@ class Steps:
         return schedule.control(self._header.protocol, len(self._examination.trials), self._header.seed)
 
     def _next_isi_ms(self) -> float | None:
-        """The ISI that is asked next [ms]; None if a control trial comes next."""
+        """The next ISI [ms]; None if a control trial comes next."""
         if self._next_control:
             return None
         if self._agenda is not None:

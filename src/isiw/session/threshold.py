@@ -51,7 +51,7 @@ def open_threshold(  # noqa: PLR0913 - what a search may state
     """Open a search for the motor threshold: ask it for intensities, and tell it what came of them.
 
     Args:
-        search: proposes intensities and learns; before its first pulse.
+        search: chooses intensities and learns; before its first pulse.
         log: where the log is; it must not exist yet.
         device: what stimulates.
         min_iti_s: shortest time between two pulses, which `ask` waits for [s].
@@ -225,7 +225,7 @@ class ThresholdRecorder(Recording[PulseOutcome]):
     """An open search; `open_threshold` opens one. As a context manager it closes its log.
 
     Args:
-        search: proposes intensities and learns.
+        search: chooses intensities and learns.
         log: the open log.
         header: what the session is: who stimulates, and how often and how fast at most.
         clock: tells the time, and waits.
@@ -253,7 +253,7 @@ class ThresholdRecorder(Recording[PulseOutcome]):
 
     @property
     def search(self) -> ThresholdSearch:
-        """The search, which proposes intensities and learns."""
+        """The search, which chooses intensities and learns."""
         return self._examination.learner.search
 
     @property

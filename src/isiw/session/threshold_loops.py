@@ -117,8 +117,6 @@ def amplitude_of(typed: str) -> float:
     value, unit = float(found[1].replace(",", ".")), (found[2] or "").lower()
     if unit == "" and value > SURELY_MV:
         raise InvalidValueError(
-            f"an amplitude above {SURELY_MV:g} needs its unit",
-            got=typed,
-            remedy=f"Type {value:g} uV or {value:g} mV.",
+            f"an amplitude above {SURELY_MV:g} needs its unit", got=typed, remedy=f"Type {value:g} uV or {value:g} mV."
         )
     return value if unit in {"", "mv"} else value / 1000

@@ -101,11 +101,7 @@ def isi_far(isi_ms: float | None, asked_ms: float | None, space: DesignSpace) ->
 
 
 def require_plausible(
-    isi_ms: float | None,
-    mep_mv: float | None,
-    asked_ms: float | None,
-    space: DesignSpace,
-    isi_sd_ms: float = 0.0,
+    isi_ms: float | None, mep_mv: float | None, asked_ms: float | None, space: DesignSpace, isi_sd_ms: float = 0.0
 ) -> None:
     """Refuse what cannot be true of one trial, or is a mistrial."""
     if isi_ms is not None and asked_ms is not None and off_by(isi_ms, asked_ms, space):

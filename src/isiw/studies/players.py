@@ -36,7 +36,7 @@ Reported: TypeAlias = WindowEstimate | Window | None
 
 
 class Player(Protocol):
-    """Protocol of what proposes ISIs in a simulated session: a strategy, or what a benchmark compares it with."""
+    """Protocol of what chooses ISIs in a simulated session: a strategy, or what a benchmark compares it with."""
 
     def ask(self) -> float:
         """The next ISI [ms]."""

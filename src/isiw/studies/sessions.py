@@ -158,7 +158,7 @@ def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
 
     Args:
         session: the session.
-        player: what proposes ISIs in it.
+        player: what chooses ISIs in it.
     """
     return examine([session], Alone(player))
 

@@ -7,8 +7,7 @@ import random
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from isiw.testing import check_device
 from isiw.trials import Stimulus
 from known import instance
 from scripted import scripted_strategy
+from waiting import until
 
 TESTS = Path(__file__).parents[2]
 SPACE = isiw.DesignSpace(10, 100, reference="impact")
@@ -40,17 +40,10 @@ def rig(place: Path, faults: Mapping[str, str] | None = None, *, waveforms: bool
     command = [sys.executable, "-m", "devices.transports.folder_rig", str(place), json.dumps(faults or {}), *flags]
     with subprocess.Popen(command, cwd=TESTS) as process:  # noqa: S603 - our own
         try:
-            wait_for((place / "ready").exists)
+            until((place / "ready").exists)
             yield
         finally:
             process.kill()
-
-
-def wait_for(happened: Callable[[], bool], timeout_s: float = 10.0) -> None:
-    end_s = time.monotonic() + timeout_s
-    while not happened():
-        assert time.monotonic() < end_s
-        time.sleep(0.005)
 
 
 def device(place: Path, **changed: Any) -> isiw.FolderDevice:
@@ -273,7 +266,7 @@ def test_a_delivery_that_nobody_has_read_is_gone_when_it_is_stopped(tmp_path: Pa
     errors: list[BaseException] = []
     delivering = threading.Thread(target=failing_delivery, args=(made, 0.6, errors))
     delivering.start()
-    wait_for(lambda: request_in(tmp_path)["verb"] == "deliver")
+    until(lambda: request_in(tmp_path)["verb"] == "deliver")
     with pytest.raises(DeviceTimeoutError):
         made.stop()
     assert request_in(tmp_path)["verb"] == "disarm"
@@ -288,7 +281,7 @@ def test_stopping_ends_a_delivery_that_waits(tmp_path: Path) -> None:
     with staged(tmp_path, "silence") as made:
         delivering = threading.Thread(target=failing_delivery, args=(made, 20.0, errors))
         delivering.start()
-        wait_for(lambda: request_in(tmp_path)["verb"] == "deliver")
+        until(lambda: request_in(tmp_path)["verb"] == "deliver")
         made.stop()
         delivering.join(5.0)
     assert "disarmed before it answered to deliver" in str(errors[0])
@@ -360,7 +353,7 @@ def test_what_is_no_file_in_the_place_of_an_answer_is_not_waited_for(tmp_path: P
     made = device(tmp_path, stage_timeout_s=0.5, stop_timeout_s=0.1)
 
     def answer() -> None:
-        wait_for((tmp_path / "request.txt").exists)
+        until((tmp_path / "request.txt").exists)
         IN_THE_WAY[kind](tmp_path / request_in(tmp_path)["answer"])
 
     hostile = threading.Thread(target=answer)
@@ -375,7 +368,7 @@ def test_an_answer_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "secret").write_text("password=1234\nend\n")
 
     def answer() -> None:
-        wait_for((tmp_path / "request.txt").exists)
+        until((tmp_path / "request.txt").exists)
         (tmp_path / request_in(tmp_path)["answer"]).symlink_to(tmp_path / "secret")
 
     hostile = threading.Thread(target=answer)

@@ -220,14 +220,7 @@ def test_trouble_of_a_fit_is_told_and_an_estimate_is_given() -> None:
 
 
 @pytest.mark.parametrize(
-    "changed",
-    [
-        {"transform": "log10"},
-        {"samples": 1},
-        {"samples": 2.5},
-        {"detection_limit_mv": 0.0},
-    ],
-    ids=str,
+    "changed", [{"transform": "log10"}, {"samples": 1}, {"samples": 2.5}, {"detection_limit_mv": 0.0}], ids=str
 )
 def test_an_invalid_setting_is_refused(changed: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):

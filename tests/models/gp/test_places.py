@@ -154,9 +154,7 @@ def test_it_conforms(space: isiw.DesignSpace) -> None:
 
 
 @pytest.mark.parametrize(
-    "learnt",
-    [{"hyperparameters": "map"}, {"fixed": FixedProcess(40.0, 1.1, 0.6, -3.8)}],
-    ids=["most likely", "fixed"],
+    "learnt", [{"hyperparameters": "map"}, {"fixed": FixedProcess(40.0, 1.1, 0.6, -3.8)}], ids=["most likely", "fixed"]
 )
 def test_the_hyperparameters_of_windows_are_averaged_over(learnt: dict[str, Any]) -> None:
     anywhere = ProcessSettings(**learnt)

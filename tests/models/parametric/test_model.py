@@ -320,14 +320,6 @@ def nuts_gap_ms(model: ParametricModel, observations: Sequence[Observation]) -> 
         return np.where(fast == slow, 0.0, np.abs(fast - slow))
 
 
-@pytest.mark.long
-def test_fast_inference_agrees_with_nuts() -> None:
-    # One data set and few draws: the Monte-Carlo error of a median is about 2 ms.
-    model = ParametricModel(likelihood="log-normal", samples=90, chains=Chains(warmup=60))
-    _, observations = simulated(model, 1, np.random.default_rng(1).uniform(150, 450, 30))
-    assert nuts_gap_ms(model, observations).max() < 8
-
-
 def test_chains_of_nuts_that_disagree_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def stuck(
         _program: object, _trials: object, starts: torch.Tensor, draws: int, _warmup: int, generator: torch.Generator

@@ -49,14 +49,7 @@ def test_with_noise_on_the_input_the_expected_mep_saturates_and_tms_alone_evokes
     assert 0.03 < (unknowns.baseline_mv + unknowns.amplitude_mv).median().item() < 0.15
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"p_window": 0.0},
-        {"width_ms": (0.0, 0.4)},
-        {"outliers": (-3.5, 0.0)},
-    ],
-)
+@pytest.mark.parametrize("wrong", [{"p_window": 0.0}, {"width_ms": (0.0, 0.4)}, {"outliers": (-3.5, 0.0)}])
 def test_an_invalid_prior_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         WindowPrior(**wrong)

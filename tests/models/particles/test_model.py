@@ -237,7 +237,7 @@ def test_the_unit_of_the_amplitude_is_learnt() -> None:
         [(-10.0, 0.01), (510.0, 0.02)],
     ],
 )
-def test_data_that_break_things_give_finite_beliefs(trials: list[tuple[float, float]]) -> None:
+def test_data_that_break_things_give_finite_estimates(trials: list[tuple[float, float]]) -> None:
     posterior = after(ParticleModel(particles=300), trials)
     estimate = posterior.estimate()
     assert 0 <= known(estimate.probability) <= 1
@@ -320,8 +320,8 @@ def test_people_of_its_own_have_windows_as_often_as_believed_and_meps_of_their_o
 def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
     # People drawn from the prior, whose MEPs are drawn from their own predictive distribution; 200 people, 20 trials at
     # even ISIs. The 90 % intervals of 200 honest posteriors cover 0.83 to 0.96 (99.8 %).
-    rng, beliefs = np.random.default_rng(11), Prior(ProfilePrior(p_window=1.0))
-    case, model = Case(beliefs, VALVE_SPACE), ParticleModel(prior=beliefs)
+    rng, prior = np.random.default_rng(11), Prior(ProfilePrior(p_window=1.0))
+    case, model = Case(prior, VALVE_SPACE), ParticleModel(prior=prior)
     hidden = case.drawn(1, 11, people=200)
     posterior = model.begin(VALVE_SPACE, 12, people=200)
     isis_ms = rng.permutation(np.linspace(170, 440, 20)).astype(np.float32)
@@ -338,14 +338,7 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [
-        {"particles": 1},
-        {"particles": 2.5},
-        {"particles": 100_001},
-        {"thinned": 0},
-        {"detection_limit_mv": 0.0},
-    ],
+    "wrong", [{"particles": 1}, {"particles": 2.5}, {"particles": 100_001}, {"thinned": 0}, {"detection_limit_mv": 0.0}]
 )
 def test_an_invalid_model_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):

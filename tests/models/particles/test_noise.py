@@ -111,13 +111,7 @@ PAIRS: list[tuple[Singles, ResponseCurve]] = [
     (particle(NoiseKind.ALL_OR_NONE), AllOrNone()),
     (
         particle(
-            NoiseKind.RECTIFIED,
-            log_ratio=math.log(200.0),
-            spread=0.7,
-            output_sd=0.2,
-            boost=1.8,
-            rest=-3.0,
-            onset=0.09,
+            NoiseKind.RECTIFIED, log_ratio=math.log(200.0), spread=0.7, output_sd=0.2, boost=1.8, rest=-3.0, onset=0.09
         ),
         Rectified(),
     ),

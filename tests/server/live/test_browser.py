@@ -8,18 +8,12 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page
 
-from browsing import IN_CHROMIUM, broken_rules, chromium, hard_to_read, screenshots
+from browsing import IN_CHROMIUM, broken_rules, hard_to_read, screenshots
 from isiw.text.sanitize import plain
 from server.live.watched import HOSTILE, Watched
 
 pytestmark = [pytest.mark.slow, IN_CHROMIUM]
 TRIALS = 8
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

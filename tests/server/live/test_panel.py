@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from matplotlib.image import imread
 from playwright.sync_api import Page
 
-from browsing import IN_CHROMIUM, broken_rules, chromium, hard_to_read, screenshots
+from browsing import IN_CHROMIUM, broken_rules, hard_to_read, screenshots
 from isiw.errors import InvalidValueError
 from isiw.session.pausing import Presses
 from isiw.session.rig import Rig
@@ -45,12 +45,6 @@ FIXED: Final = (
 )
 SEQUENCES: Final = int(os.environ.get("ISIW_BROWSER_SEQUENCES", "6"))
 """How many sequences of presses are drawn in the browser; three hundred take some minutes."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ from isiw.sweeps import Channel, Sweep
 from isiw.trials import Stimulus
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy
 from server.serving import NOBODY
+from waiting import until
 
 PATIENCE_S = 20.0
 HOSTILE = "<script>document.title='taken'</script><b>P07</b>\x1b[2J"
@@ -93,10 +94,7 @@ class Watched:
         assert not self._thread.is_alive()
 
     def until(self, holds: Any) -> None:
-        end_s = time.monotonic() + PATIENCE_S
-        while not holds():
-            assert time.monotonic() < end_s, "it took too long"
-            time.sleep(0.005)
+        until(holds, PATIENCE_S)
 
     def press(self, button: str, **body: Any) -> httpx.Response:
         return self.client.post(f"/{button}", json=body)

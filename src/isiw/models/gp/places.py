@@ -138,11 +138,7 @@ def _processes(prior: WindowsPrior, space: DesignSpace) -> tuple[Hyperparameters
     nowhere = Places.everywhere(FLAT)
     ones = torch.ones_like(start_ms)
     rising = Places(
-        start_ms + 0.5 * width_ms,
-        width_ms / WIDTH_SDS,
-        prior.rise.median * ones,
-        prior.rise.sd * ones,
-        growth.log(),
+        start_ms + 0.5 * width_ms, width_ms / WIDTH_SDS, prior.rise.median * ones, prior.rise.sd * ones, growth.log()
     )
     lengths, amplitudes = prior.length_share * width_ms, prior.deviation * ones
     with_and_without = (

@@ -1,4 +1,4 @@
-"""What is believed of a person's responses before the first trial, and where each belief comes from.
+"""The prior of a person's responses, and where each law in it comes from.
 
 The first of several laws is what is usual, the others say what else may be.
 """

@@ -13,16 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.models.particles.records import (
-    FLOOR_SD,
-    LOG_FLOOR,
-    LOG_RATIO,
-    ONSET,
-    OUTPUT_SD,
-    REST,
-    SLOPE,
-    SPREAD,
-)
+from isiw.models.particles.records import FLOOR_SD, LOG_FLOOR, LOG_RATIO, ONSET, OUTPUT_SD, REST, SLOPE, SPREAD
 from isiw.models.shared.history import COUNTS, SHIFT, History
 from isiw.native.engine import RESPONSE_LEVELS
 from isiw.types import FloatArray, Singles

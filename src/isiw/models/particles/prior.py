@@ -1,6 +1,6 @@
-"""The prior over people: what is believed of one before the first trial.
+"""The prior over people.
 
-A particle is a vector of latents and the kinds of its profile and noise. What is believed of a block of latents is a
+A particle is a vector of latents and the kinds of its profile and noise. The prior of a block of latents is a
 mixture of what is usual and of what else may be, so that particles are where unusual people are from the first trial
 on, and moves need no Jacobians.
 """
@@ -101,7 +101,7 @@ class Prior(Checked):
 
     @cached_property
     def mixtures(self) -> dict[str, Mixture]:
-        """What is believed of each block but the start, places aside."""
+        """The prior of each block but the start, places aside."""
         switch, session = self.switch, self.session
         often = [switch.switched_on.law, switch.switched_off.law]
         return {

@@ -1,4 +1,4 @@
-"""What is believed of the facilitation by ISI before the first trial, and where each belief comes from.
+"""The prior of the facilitation by ISI, and where each law in it comes from.
 
 The first of several laws is what is usual, the others say what else may be.
 """

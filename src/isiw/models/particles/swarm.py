@@ -27,7 +27,7 @@ from isiw.native.engine import Seeds, log_likelihoods
 from isiw.types import BoolArray, FloatArray, Singles
 
 LEAST_ESS = 0.01
-"""Effective sample size before resampling, as a share of the particles: below it a trial contradicted the belief."""
+"""Effective sample size before resampling, as a share of the particles: below it a trial contradicted the posterior."""
 
 LEAST_ACCEPTED = 0.05
 """Share of the shifts that must be accepted for the particles to explore the posterior."""

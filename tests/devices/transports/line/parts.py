@@ -42,10 +42,7 @@ def over(how: str, peer: PulsePeer) -> AbstractContextManager[str]:
 
 
 def made(
-    address: str,
-    commands: Mapping[str, Any] = PEER_COMMANDS,
-    line: Mapping[str, Any] | None = None,
-    **arguments: Any,
+    address: str, commands: Mapping[str, Any] = PEER_COMMANDS, line: Mapping[str, Any] | None = None, **arguments: Any
 ) -> isiw.LineDevice:
     return isiw.LineDevice(address, INFO, commands, line, **arguments)
 

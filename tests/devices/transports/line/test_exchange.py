@@ -69,9 +69,7 @@ def test_an_answer_to_an_earlier_command_is_none_to_this_one() -> None:
     assert line(b"{-1} ISI 40\n{0} ISI 50\n{0} ISI 60\n")[0].ask(ASKED, timeout_s=1.0)["isi_ms"] == "50"
 
 
-def test_without_numbers_what_came_before_the_command_is_thrown_away_and_said(
-    warned: io.StringIO,
-) -> None:
+def test_without_numbers_what_came_before_the_command_is_thrown_away_and_said(warned: io.StringIO) -> None:
     asking, connection = line(b"ISI 50\n")
     connection.waiting = b"ISI 40\nIS"
     assert asking.ask(PLAIN, timeout_s=1.0)["isi_ms"] == "50"

@@ -125,7 +125,7 @@ class SupraPrior:
 
     @cached_property
     def mixtures(self) -> tuple[Mixture, ...]:
-        """What is believed of each latent but the starts, in the order of `LATENTS`."""
+        """The prior of each latent but the starts, in the order of `LATENTS`."""
         startup = self.session.startup
         session = [(0.0, self.session.drift_sd), (startup.median, startup.sd)]
         return (
