@@ -7,7 +7,6 @@
 #   table keeps the place of each level, counted from 0. With pandas 2 the levels are there. The Latin hypercube, made another
 #   way, is right.
 # Hurts: a session run from the table: an intensity of 1 % and an interval of 0 ms are valid, and nothing is said.
-# (Needs a Python before 3.14, as it needs a pandas before 3, too.)
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

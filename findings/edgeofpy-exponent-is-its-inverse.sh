@@ -8,7 +8,7 @@
 #   default, fits a distribution to the list of mean sizes and never looks at the durations: for powers of 1.2, 1.5 and 2 it is
 #   1.34, 1.30 and 1.23, and the same if the durations are ten times as long.
 # Hurts: the deviation from criticality of EEG and MEG: exactly critical avalanches deviate by 1.5 and 0.8, not by 0.
-# (Needs a Python before 3.13, as it needs a numpy before 2.)
+# (Needs a Python before 3.12, as it needs a pandas before 2.)
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

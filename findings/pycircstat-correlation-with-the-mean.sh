@@ -8,7 +8,7 @@
 #   phase it is 0.15 around 0, 1.7 around 10 and 17 around 100.
 # Hurts: phase-dependence of evoked potentials (MEP amplitude by the phase of the rhythm at the pulse): amplitudes are never
 #   around zero, so that an effect is found where there is none.
-# (Needs a Python before 3.13, as it needs a numpy before 2.)
+# (Needs a Python before 3.12, as it needs a pandas before 2.)
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
