@@ -14,10 +14,10 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 python3 -m venv "$tmp/venv"
 "$tmp/venv/bin/pip" install -q --disable-pip-version-check \
-    numpy==1.26.4 scipy==1.11.4 pandas==1.5.3 setuptools==80.9.0 wheel==0.45.1
+    numpy==1.26.4 scipy==1.11.4 pandas==1.5.3 matplotlib==3.8.4 setuptools==80.9.0 wheel==0.45.1
 "$tmp/venv/bin/pip" install -q --disable-pip-version-check --no-deps --no-build-isolation ecg-analysis==0.1.2
 cd "$tmp"
-"$tmp/venv/bin/python" -W ignore - <<'PY'
+MPLBACKEND=agg "$tmp/venv/bin/python" -W ignore - <<'PY'
 import importlib.metadata as meta
 import sys
 

@@ -12,7 +12,7 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 python3 -m venv "$tmp/venv"
 "$tmp/venv/bin/pip" install -q --disable-pip-version-check \
-    numpy==2.4.6 scipy==1.17.1 pandas==3.1.1 matplotlib==3.11.2 scikit-learn==1.9.1
+    numpy==2.4.6 scipy==1.17.1 pandas==3.1.1 matplotlib==3.11.2 scikit-learn==1.9.1 sigfig==1.4.0
 "$tmp/venv/bin/pip" install -q --disable-pip-version-check --no-deps hillfit==0.1.7
 cd "$tmp"
 MPLBACKEND=agg "$tmp/venv/bin/python" -W ignore - <<'PY'
