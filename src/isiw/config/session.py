@@ -234,16 +234,17 @@ def device_for(config: RunConfig) -> Device:
     """
     if config.device is not None and config.device.factory is not None:
         return device_from_factory(config.device.factory, config.device.settings, config.device.folder)
-    return simulated_device(config.seed, config.subject, config.space, config.subject.data, config.robot)
+    visit, person = config.visit.noted(), config.subject
+    return simulated_device(config.seed, person, config.space, visit, person.data, config.robot)
 
 
 def simulated_device(
-    seed: int, person: SimulatedConfig, space: DesignSpace, data: Path | None, robot: RobotConfig | None = None
+    seed: int, person: SimulatedConfig, space: DesignSpace, visit: Visit, data: Path | None, robot: RobotConfig | None
 ) -> SimulatedDevice:
     """The device of a simulated person."""
     if robot is not None:
-        return SimulatedDevice(robot_for(robot, seed, person, space))
-    reference, subject = space.reference, person.person(seed)
+        return SimulatedDevice(robot_for(robot, seed, person, space, visit.intensity_pct_rmt))
+    reference, subject = space.reference, person.person(seed, visit.intensity_pct_rmt)
     respond = partial(subject.begin(seed).respond, reference=reference)
     delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
     stated: dict[str, Any] = {"hit_delay_ms": delay_ms, "conditioning": subject.conditioning}
