@@ -317,6 +317,11 @@ def test_a_space_can_be_a_list_of_isis_and_not_a_range_as_well(tmp_path: Path) -
     [
         ('[device]\nfactory = "rig:make"\ntimeout_s = 30000', r"device.timeout_s.*Is it in ms"),
         ("[limits]\nmax_coil_c = 4000.0", "such as 40"),
+        ("[limits]\nintensity_pct_mso = 0.55", "Multiply by 100"),
+        ("[limits]\nmax_intensity_pct_rmt = 1100.0", "Divide by 10"),
+        ("seed = true", "a whole number"),
+        ("[signals]\nbackground_uv = 10000.0", "Divide by 1000"),
+        ("[signals]\nmep_window_ms = [15000, 35000]", "Divide by 1000"),
         ("[protocol]\niti_s = [2.0, 4.0]", "intervals up to more than 5 s"),
     ],
 )

@@ -90,7 +90,7 @@ class SimulatedConfig(BaseModel):
 
     kind: Literal["simulated", "recorded"] = "simulated"
     cohort: Annotated[str, AfterValidator(lambda name: choice("the cohort", name, COHORTS))] = "recruitment"
-    number: int = Field(default=0, ge=0, lt=10_000)
+    number: int = Field(default=0, ge=0, lt=10_000, strict=True)
     after_effect: Annotated[str, AfterValidator(lambda name: choice("the after-effect", name, AFTER_EFFECTS))] = "none"
 
     def person(self, seed: int, pct_rmt: float | None = None) -> SimulatedSubject:
