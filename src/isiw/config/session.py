@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from isiw.config.given import Before, Given, before_of, given_before, is_table
 from isiw.config.run import RunConfig, limits_for
-from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
+from isiw.config.sections import RobotConfig, SimulatedConfig, robot_for
 from isiw.design import DesignSpace
 from isiw.devices.info import DeviceInfo
 from isiw.devices.protocol import Device, info_of
@@ -242,6 +242,12 @@ def simulated_device(
     seed: int, person: SimulatedConfig, space: DesignSpace, visit: Visit, data: Path | None, robot: RobotConfig | None
 ) -> SimulatedDevice:
     """The device of a simulated person."""
+    if data is not None and person.kind != "recorded":
+        raise ConfigError(
+            "recordings are for a subject of the kind recorded, and would be ignored",
+            got=str(data),
+            remedy='Add --subject recorded, or kind = "recorded" under [subject]; or leave the data out.',
+        )
     if robot is not None:
         return SimulatedDevice(robot_for(robot, seed, person, space, visit.intensity_pct_rmt))
     reference, subject = space.reference, person.person(seed, visit.intensity_pct_rmt)
@@ -284,7 +290,6 @@ def session_for(config: RunConfig, intervention: Intervention | None = None) -> 
         LogError: an earlier session of the person that cannot be read, or has no accepted trial.
         StrategyError: a prior for a strategy that has none of this kind.
     """
-    _require_used(config.subject)
     space = config.design()
     log = config.log or fresh_log_path(config)
     device = device_for(config)
@@ -341,15 +346,6 @@ def intervention_for(config: RunConfig) -> Session:
 def _code(config: RunConfig) -> str:
     """The code of a simulated person; empty of a real one."""
     return "" if config.own_rig else f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
-
-
-def _require_used(subject: SubjectConfig) -> None:
-    if subject.data is not None and subject.kind != "recorded":
-        raise ConfigError(
-            "recordings are for a subject of the kind recorded, and would be ignored",
-            got=str(subject.data),
-            remedy='Add --subject recorded, or kind = "recorded" under [subject]; or leave the data out.',
-        )
 
 
 def _kept(config: RunConfig) -> dict[str, Any]:
