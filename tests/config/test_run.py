@@ -320,6 +320,7 @@ def test_a_space_can_be_a_list_of_isis_and_not_a_range_as_well(tmp_path: Path) -
         ("[limits]\nintensity_pct_mso = 0.55", "Multiply by 100"),
         ("[limits]\nmax_intensity_pct_rmt = 1100.0", "Divide by 10"),
         ("seed = true", "a whole number"),
+        ("[visit]\nday = 20260304", "no date"),
         ("[signals]\nbackground_uv = 10000.0", "Divide by 1000"),
         ("[signals]\nmep_window_ms = [15000, 35000]", "Divide by 1000"),
         ("[protocol]\niti_s = [2.0, 4.0]", "intervals up to more than 5 s"),

@@ -21,6 +21,9 @@ from isiw.visit import Visit, VisitProtocol, interval_s
 MOST_COIL_C = 60.0
 """No coil that touches a person may be as hot as that [°C]."""
 
+MOST_DAY = 9999
+"""Nobody comes so often; a date as a number is larger."""
+
 
 def require_limits(limits: PulseLimits) -> None:
     """Raise InvalidValueError if a limit limits nothing, or is probably in another unit.
@@ -103,15 +106,21 @@ def require_protocol(protocol: VisitProtocol, min_iti_s: float) -> None:
 
 
 def require_visit(visit: Visit, assumed_pct_rmt: float | None = None) -> None:
-    """Raise if an intensity is probably in another unit, or not the one that the strategy assumes.
+    """Raise if the day is a date, or an intensity is probably in another unit, or not the one that is assumed.
 
     Args:
         visit: the visit.
         assumed_pct_rmt: the intensity that the strategy assumes [% RMT]; None if it assumes none.
 
     Raises:
-        InvalidValueError: an intensity below 3 %, or one other than the strategy's.
+        InvalidValueError: a day that is none, an intensity below 3 %, or one other than the strategy's.
     """
+    if visit.day is not None and visit.day > MOST_DAY:
+        raise InvalidValueError(
+            "the visit's day is the number of the person's visit, from 1, and no date",
+            got=visit.day,
+            expected=f"at most {MOST_DAY}",
+        )
     noted = visit.intensity_pct_rmt
     require_percent("the visit's intensity_pct_rmt", noted)
     require_percent("the visit's intensity_pct_mso", visit.intensity_pct_mso)
