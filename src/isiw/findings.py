@@ -159,12 +159,12 @@ AMPLITUDE_MV: Final = UnitScale(2e-4, 30.0, ("V", 1000), ("µV", 1000))
 SMALLEST_MV: Final = UnitScale(most=1.0, too_large=("µV", 1000))
 """The least amplitude that is measured, or counts as a response; nobody leaves out all that is below a millivolt."""
 
-BACKGROUND_LIMIT_UV: Final = UnitScale(0.2, too_small=("mV", 1000))
-"""The most EMG at rest that somebody allows; no amplifier is so quiet as the least."""
+BACKGROUND_LIMIT_UV: Final = UnitScale(0.2, 5000.0, ("mV", 1000), ("nV", 1000))
+"""The most EMG at rest that somebody allows; no amplifier is so quiet as the least, no muscle reaches the most."""
 
-WINDOW_END_MS: Final = UnitScale(1.0, too_small=("seconds", 1000))
+WINDOW_END_MS: Final = UnitScale(1.0, 1000.0, ("seconds", 1000), ("µs", 1000))
 DELAY_MS: Final = UnitScale(1.0, too_small=("seconds", 1000))
-"""No MEP has ended so soon after the pulse; and no hammer hits, nor does a shock travel so fast."""
+"""No MEP has ended so soon after the pulse, nor lasts so long; and no hammer hits, nor does a shock travel so fast."""
 
 RATE_HZ: Final = UnitScale(500.0, too_small=("kHz", 1000))
 """Below this nothing of a surface MEP or an impact is seen; recordings use 3–10 kHz."""

@@ -234,6 +234,11 @@ def test_the_profile_is_correlated_with_measured_means(isiw: Command, log: Path,
     result = isiw("correlate", log, measured)
     assert result.exit_code == 0, result.output
     assert "correlates with the mean MEPs of P1 (sweep.mcap) by" in " ".join(result.output.split())
+    empty = write_log(tmp_path / "empty.mcap", trials=0, space=read_session(log).header.space)
+    for words in (["correlate", log, empty], ["counts", empty]):
+        refused = isiw(*words)
+        assert refused.exit_code == 1
+        assert "no pair of stimuli in the log counts" in " ".join(refused.output.split())
 
 
 def test_responses_are_counted_by_a_threshold_of_ones_own(isiw: Command, tmp_path: Path) -> None:

@@ -272,11 +272,12 @@ def test_a_session_that_pauses_where_nobody_is_ends_with_a_code_of_its_own(isiw:
     assert "isiw resume 'a lab.mcap' CONFIG, where CONFIG names your device" in isiw("show", "a lab.mcap").output
 
 
-def test_recordings_that_would_be_ignored_are_refused(isiw: Command, tmp_path: Path) -> None:
+def test_recordings_that_would_be_ignored_are_refused(isiw: Command, tmp_path: Path, log: Path) -> None:
     (tmp_path / "c.toml").write_text('[subject]\ndata = "recordings"\n', encoding="utf-8")
-    result = isiw("run", "c.toml")
-    assert result.exit_code == 1
-    assert "would be ignored" in result.output
+    for words in (["run", "c.toml"], ["resume", log, "--data", "recordings"]):
+        result = isiw(*words)
+        assert result.exit_code == 1
+        assert "would be ignored" in result.output
 
 
 @pytest.mark.slow

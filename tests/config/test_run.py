@@ -10,15 +10,17 @@ import tomli_w
 from isiw.config import RunConfig, device_for, load_config, session_for
 from isiw.config.given import given_before
 from isiw.config.resume import Truth, run_of_log, truth_of
+from isiw.config.sections import SimulatedConfig
 from isiw.config.session import assumed_space, fresh_log_path
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, IsiwError, StrategyError
 from isiw.log.record import read_session
 from isiw.session.loop import Session
-from isiw.session.threshold import open_threshold, resume_threshold
+from isiw.session.threshold import open_threshold, read_threshold, resume_threshold
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
 from isiw.subjects.cohorts import person_of
+from isiw.subjects.responses import RecruitmentResponse
 from scripted import ScriptedDevice, scripted_strategy
 
 WriteFile: TypeAlias = Callable[[str], Path]
@@ -315,6 +317,12 @@ def test_a_space_can_be_a_list_of_isis_and_not_a_range_as_well(tmp_path: Path) -
     [
         ('[device]\nfactory = "rig:make"\ntimeout_s = 30000', r"device.timeout_s.*Is it in ms"),
         ("[limits]\nmax_coil_c = 4000.0", "such as 40"),
+        ("[limits]\nintensity_pct_mso = 0.55", "Multiply by 100"),
+        ("[limits]\nmax_intensity_pct_rmt = 1100.0", "Divide by 10"),
+        ("seed = true", "a whole number"),
+        ("[visit]\nday = 20260304", "no date"),
+        ("[signals]\nbackground_uv = 10000.0", "Divide by 1000"),
+        ("[signals]\nmep_window_ms = [15000, 35000]", "Divide by 1000"),
         ("[protocol]\niti_s = [2.0, 4.0]", "intervals up to more than 5 s"),
     ],
 )
@@ -366,9 +374,20 @@ def test_a_session_after_a_search_for_the_threshold_knows_its_pulses_and_counts_
     said = given_before(config).sentence(config)
     assert "6 pulses of the search for the threshold came before" in said
     assert "of FCR, at the same hot spot" in said
-    twice = config_file(f'after = ["FCR-P07.mcap"]\nearlier = ["curve.csv", "./curve.csv"]\n{VISIT}')
-    with pytest.raises(ConfigError, match=r"named twice.*Name it once"):
-        session_for(load_config(twice).with_overrides(log=tmp_path / "c.mcap"))
+
+
+def test_the_same_pulses_in_two_files_are_refused_whatever_the_files_are_called(
+    tmp_path: Path, config_file: WriteFile
+) -> None:
+    amplitudes_mv = [outcome.mep_mv for outcome in read_threshold(threshold_log(tmp_path)).outcomes]
+    rows = "".join(f"110;{mep_mv}\n" for mep_mv in amplitudes_mv)
+    (tmp_path / "of_log.csv").write_text("intensity_pct_rmt;mep_mv\n" + rows)
+    (tmp_path / "curve.csv").write_text("Pulse,intensity_pct_rmt,mep_mv\n1,110,0.4\n2,130,1.1\n")
+    (tmp_path / "again.csv").write_text("intensity_pct_rmt;mep_mv\n110;0,4\n130;1,1\n")
+    for earlier in ('"of_log.csv"', '"curve.csv", "again.csv"', '"curve.csv", "./curve.csv"'):
+        twice = load_config(config_file(f'after = ["FCR-P07.mcap"]\nearlier = [{earlier}]\n{VISIT}'))
+        with pytest.raises(ConfigError, match=r"same pulses, which would count twice.*Leave one out"):
+            given_before(twice)
 
 
 def test_a_search_of_another_muscle_or_person_is_refused_and_one_without_a_muscle_is_named(
@@ -394,7 +413,7 @@ def test_a_search_of_another_muscle_or_person_is_refused_and_one_without_a_muscl
         ("intensity_pct_rmt,mep_mv\n110,0.0009\n", "less than EMG at rest has.*in V"),
         ("intensity_pct_rmt,mep_mv\n110,0,4\n", "row 1 of .* more cells .*decimal sign"),
         ("intensity_pct_rmt,mep_mv\n", "no table of pulses"),
-        ("intensity_pct_rmt;mep_mv\n110;0.4\n", "with a comma between"),
+        ("intensity_pct_mso;mep_mv\n110;0.4\n", "intensity_pct_rmt is 100 times it by the threshold in % MSO"),
         ("intensity_pct_rmt,mep_mv,isi_ms\n110,0.4,80\n", "leave out other rows and columns"),
         ("intensity_pct_rmt,mep_mv,mep_mv\n110,0.4,80\n", "leave out other rows and columns"),
     ],
@@ -411,9 +430,14 @@ def test_a_table_that_holds_no_pulses_is_refused_by_its_row(
 def test_a_table_of_a_spreadsheet_has_spaces_and_empty_rows_and_is_no_workbook(
     tmp_path: Path, config_file: WriteFile
 ) -> None:
-    (tmp_path / "curve.csv").write_text("intensity_pct_rmt, mep_mv\n110, 0.4\n,\n\n")
-    config = load_config(config_file(f'earlier = ["curve.csv"]\n{VISIT}'))
-    assert [(trial.intensity_pct_rmt, trial.mep_mv) for trial in given_before(config).pulses] == [(110.0, 0.4)]
+    for table in (
+        "intensity_pct_rmt, mep_mv\n110, 0.4\n,\n\n",
+        "intensity_pct_rmt;mep_mv\r\n110;0,4\r\n;\r\n",
+        "mep_mv\tintensity_pct_rmt\n0,4\t110,0\n",
+    ):
+        (tmp_path / "curve.csv").write_text(table)
+        config = load_config(config_file(f'earlier = ["curve.csv"]\n{VISIT}'))
+        assert [(trial.intensity_pct_rmt, trial.mep_mv) for trial in given_before(config).pulses] == [(110.0, 0.4)]
     (tmp_path / "curve.xlsx").write_bytes(b"PK\xc7")
     config = load_config(config_file(f'earlier = ["curve.xlsx"]\n{VISIT}'))
     with pytest.raises(ConfigError, match=r"cannot be read.*Save it as CSV"):
@@ -441,6 +465,27 @@ def test_a_visit_with_pulses_over_the_curve_needs_the_log_of_all_of_them(
     assert session_for(after).header.given_before == 4
     with pytest.raises(ConfigError, match="at_pct_mso"):
         load_config(config_file(f"{VISIT}curve = {{ each = 2 }}"))
+
+
+def test_a_simulated_person_is_stimulated_at_the_intensity_of_the_visit(tmp_path: Path, config_file: WriteFile) -> None:
+    own = person_of("rmt-off", 0, 3)
+    person = SimulatedConfig(cohort="rmt-off").person(3, 115.0)
+    assert isinstance(own.response, RecruitmentResponse)
+    assert isinstance(person.response, RecruitmentResponse)
+    off_pct_rmt = own.response.intensity_pct_rmt - 90.0  # their threshold was measured wrongly, by as much at any
+    assert person.response.intensity_pct_rmt == pytest.approx(115.0 + off_pct_rmt)
+    sums_mv = []
+    for pct_rmt in (90, 130):
+        config = load_config(
+            config_file(
+                f"[strategy.settings]\nparticles = 20\nmax_trials = 8\n[visit]\nintensity_pct_rmt = {pct_rmt}\n"
+            )
+        )
+        result = session_for(config.with_overrides(log=tmp_path / f"{pct_rmt}.mcap")).run()
+        sums_mv.append(sum(trial.mep_mv or 0.0 for trial in result.trials))
+        record = read_session(tmp_path / f"{pct_rmt}.mcap")
+        assert truth_of(record).window == SimulatedConfig().person(0, pct_rmt).window(record.header.space)
+    assert sums_mv[1] > 1.5 * sums_mv[0]
 
 
 def test_a_simulated_person_may_have_an_after_effect(config_file: WriteFile) -> None:

@@ -39,6 +39,16 @@ def test_two_spellings_of_one_code_are_not_analysed_as_two_people_also_of_those_
         analyse_person(read_files([tmp_path / "people.csv"], Way(Layout(reference="impact")))[0], Way())
 
 
+def test_an_output_that_is_neither_a_log_nor_a_folder_is_refused(tmp_path: Path) -> None:
+    read_people_of(["P07"], tmp_path)
+    files, way = [tmp_path / "people.csv"], Way(Layout(reference="impact"))
+    with pytest.raises(InvalidValueError, match="neither a log nor a folder"):
+        read_files(files, way, tmp_path / "z.csv")
+    (tmp_path / "2026.day").mkdir()
+    (person,) = read_files(files, way, tmp_path / "2026.day")
+    assert person.log == tmp_path / "2026.day" / "P07.mcap"
+
+
 @pytest.mark.parametrize("code", ["CON", "aux.1", "lpt1"])
 def test_a_code_that_windows_keeps_for_itself_is_refused(code: str, tmp_path: Path) -> None:
     first, second = read_people_of(["P07", code], tmp_path)

@@ -11,6 +11,8 @@ import pandas as pd
 import pytest
 
 from export.recorded import sweep, write_sweeps
+from isiw.existing.batch import Way, analyse_person, read_files
+from isiw.existing.layout import Layout
 from isiw.export import Exported, export_logs
 from isiw.log.record import read_session
 from isiw.session.afterwards import exclude
@@ -202,6 +204,21 @@ def test_sessions_that_were_begun_in_the_same_second_are_not_taken_for_copies(tm
     told, sessions = exported(tmp_path / "logs" / "a.mcap", tmp_path)
     assert sorted(sessions.log) == ["a.mcap", "b.mcap", "c.mcap"]
     assert all("session" in loss and "left out" not in loss for loss in told.lacking)
+
+
+def test_two_blocks_of_one_person_and_day_that_were_delivered_without_isiw_are_both_exported(tmp_path: Path) -> None:
+    for block in (1, 2):
+        table = tmp_path / f"{block}.csv"
+        rows = "".join(f"P02,2026-03-04,{isi_ms},{0.01 * block}\n" for isi_ms in range(20, 300, 40))
+        table.write_text("subject,date,isi_ms,mep_mv\n" + rows)
+        way = Way(Layout(reference="impact"), settings={"particles": 20})
+        (person,) = read_files([table], way, tmp_path / "logs" / f"{block}.mcap")
+        analyse_person(person, way)
+    one = tmp_path / "logs" / "1.mcap"
+    copied(one, "of-1.mcap")
+    told, sessions = exported(one, tmp_path)
+    assert sorted(sessions.log) == ["1.mcap", "2.mcap"]
+    assert [loss.partition(" is left out")[0] for loss in told.lacking] == ["of-1.mcap"]
 
 
 def test_a_log_beside_the_file_that_goes_on_from_it_needs_no_word(log: Path, tmp_path: Path) -> None:

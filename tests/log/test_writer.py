@@ -4,7 +4,7 @@ import errno
 import os
 import time
 from pathlib import Path
-from typing import Never
+from typing import Any, Never
 
 import numpy as np
 import pytest
@@ -69,6 +69,23 @@ def test_a_file_that_appears_meanwhile_is_not_overwritten_at_the_end(tmp_path: P
         log.close()
     assert (tmp_path / "s.mcap").read_bytes() == b"precious"
     assert len(read_session(tmp_path / "s.mcap.part").table) == 2
+
+
+def test_a_session_that_began_a_moment_earlier_has_the_name_and_the_message_says_so(
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log, begins, others = tmp_path / "s.mcap", LogWriter.begin, []
+
+    def slowly(own: LogWriter, *args: Any) -> None:
+        monkeypatch.undo()
+        others.append(LogWriter.create(log, header))
+        begins(own, *args)
+
+    monkeypatch.setattr(LogWriter, "begin", slowly)
+    with pytest.raises(LogError, match=r"there is a log already.*Choose another path"):
+        LogWriter.create(log, header)
+    assert [file.name for file in tmp_path.iterdir()] == ["s.mcap.part"]
+    others.pop().close()
 
 
 def test_a_folder_that_cannot_be_created_is_named(tmp_path: Path, header: Header) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -143,14 +144,20 @@ def test_amplitudes_that_hardly_vary_are_doubted() -> None:
     assert doubt_of((0.3 * (1.0 + 0.3 * rng.standard_normal(8))).tolist()) is None
 
 
-@pytest.mark.parametrize("window_ms", [(0.0, 50.0), (0.015, 35.0)])
-def test_a_window_that_begins_in_the_pulses_artefact_is_refused_where_it_is_stated(
-    window_ms: tuple[float, float],
+@pytest.mark.parametrize(
+    ("stated", "says"),
+    [
+        ({"mep_window_ms": (0.0, 50.0)}, "the pulse's artefact"),
+        ({"mep_window_ms": (0.015, 35.0)}, "the pulse's artefact"),
+        ({"isi_tolerance_ms": 20.0}, "would have no effect"),
+    ],
+)
+def test_a_window_in_the_pulses_artefact_and_a_tolerance_without_effect_are_refused_where_they_are_stated(
+    stated: dict[str, Any], says: str
 ) -> None:
-    stated = SignalLimits(mep_window_ms=window_ms)
-    with pytest.raises(InvalidValueError, match="the pulse's artefact"):
-        require_signals(stated)
-    require_signals(LIMITS)
+    with pytest.raises(InvalidValueError, match=says):
+        require_signals(SignalLimits(**stated), SPACE)
+    require_signals(LIMITS, SPACE)
 
 
 @pytest.mark.parametrize("values", [["1,5", "2,5"], [[1.0, 2.0], [1.0]], [1j, 2j]])

@@ -176,7 +176,9 @@ def test_an_unknown_setting_of_the_prior_names_the_known_ones() -> None:
         make_strategy(prior={"profile": {"p_windows": 0.5}})
 
 
-@pytest.mark.parametrize("settings", [{"stop_no_window": 1.5}, {"particles": 1}])
+@pytest.mark.parametrize(
+    "settings", [{"stop_no_window": 1.5}, {"particles": 1}, {"intensities_pct_rmt": (100, 110), "particles": 20}]
+)
 def test_an_invalid_setting_is_refused_when_the_strategy_is_made(settings: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(settings))):
         make_strategy(**settings)

@@ -125,7 +125,8 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
         show(f"error: {error}", style="red", stderr=True)
         raise typer.Exit(DAMAGED if isinstance(error, isiw.errors.DamagedLogError) else 1) from error
     except OSError as error:
-        text = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+        way_on = "Check that path, its permissions, and the room on its disk."
+        text = f"{error.filename}: {error.strerror}. {way_on}" if error.filename and error.strerror else str(error)
         show(f"error: {text}", style="red", stderr=True)
         raise typer.Exit(1) from error
     except KeyboardInterrupt as error:

@@ -6,7 +6,7 @@ import csv
 import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 from isiw.config.run import RunConfig
 from isiw.errors import ConfigError
@@ -28,8 +28,13 @@ _COLUMNS: Final = ("intensity_pct_rmt", "mep_mv")
 _COUNTING: Final = frozenset({"pulse", "number", "no", "nr", "index", "trial", "time", "time_s", "date"})
 """Columns that number or date pulses, and say nothing else of them."""
 
+_OF_MSO: Final = "From an intensity in % MSO, intensity_pct_rmt is 100 times it by the threshold in % MSO. "
+
 _TABLES: Final = frozenset({".csv", ".tsv", ".txt", ".xlsx", ".xls"})
-"""Of these CSV alone is read; the others are no logs either, and who names one is told so."""
+"""Of these text alone is read; the others are no logs either, and who names one is told so."""
+
+
+_Table: TypeAlias = tuple[Path, tuple[Trial, ...]]
 
 
 class Given(NamedTuple):
@@ -57,20 +62,28 @@ def given_before(config: RunConfig) -> Given:
     after = [read_any(salvage(path)) for path in config.after]
     searches = [record for record in after if isinstance(record, ThresholdRecord)]
     _require_searches(config, searches)
+    tables = [(path, _pulses_of_table(path)) for path in config.earlier if is_table(path)]
+    _require_each_once(searches, tables)
     return Given(
         [record for record in after if isinstance(record, SessionRecord)],
         searches,
         [read_session(path) for path in config.earlier if not is_table(path)],
-        [pulse for path in _tables(config) for pulse in _pulses_of_table(path)],
+        [pulse for _, pulses in tables for pulse in pulses],
     )
 
 
-def _tables(config: RunConfig) -> list[Path]:
-    """The tables of earlier pulses, each once."""
-    tables = [path.resolve() for path in config.earlier if is_table(path)]
-    if twice := next((path for path in tables if tables.count(path) > 1), None):
-        raise ConfigError("a table of earlier pulses is named twice", got=str(twice), remedy="Name it once.")
-    return tables
+def _require_each_once(searches: Sequence[ThresholdRecord], tables: Sequence[_Table]) -> None:
+    """Raise if two tables, or a table and a log, are of the same pulses, whatever they are called."""
+    of_logs = [(search.path, [outcome.mep_mv for outcome in search.outcomes]) for search in searches]
+    of_tables = [(path, [pulse.mep_mv for pulse in pulses]) for path, pulses in tables]
+    for first, second in itertools.combinations([*of_logs, *of_tables], 2):
+        if second in of_tables and first[1] == second[1] and any(second[1]):
+            raise ConfigError(
+                "two files are of the same pulses, which would count twice",
+                got=f"{first[0]} and {second[0]}",
+                expected="each pulse once",
+                remedy="Leave one out.",
+            )
 
 
 def _require_searches(config: RunConfig, searches: Sequence[ThresholdRecord]) -> None:
@@ -121,22 +134,27 @@ def _pulses_of_table(path: Path) -> tuple[Trial, ...]:
     """The pulses of TMS alone in a table of intensities and amplitudes, in the order of its rows."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            table = csv.DictReader(file)
-            table.fieldnames = names = [name.strip() for name in table.fieldnames or []]
+            head = next(file, "")
+            between = next((sign for sign in ";\t" if sign in head), ",")
+            names = [name.strip() for name in next(csv.reader([head], delimiter=between), [])]
+            table = csv.DictReader(file, names, delimiter=between)
             rows = [row for row in table if any(row.values())]  # a spreadsheet writes empty ones below the last
     except (OSError, ValueError, csv.Error) as error:
         remedy = "Save it as CSV, in UTF-8, with commas between the columns."
         raise ConfigError("the table of pulses cannot be read", got=f"{path}: {error}", remedy=remedy) from error
     # Another column may say that a row is a pair, of another muscle, or to be left out.
     if sorted(name for name in names if name.casefold() not in _COUNTING) != sorted(_COLUMNS) or not rows:
+        of_mso = _OF_MSO if any("mso" in name.casefold() for name in names) else ""
         raise ConfigError(
             "this is no table of pulses that were given before",
             got=f"the columns {', '.join(names) or 'none'} in {path}",
-            expected=f"the columns {' and '.join(_COLUMNS)}, perhaps pulse or time_s, with a comma between, and a row "
-            "for each pulse",
-            remedy="Keep pulses of TMS alone that count, of the visit's muscle, and leave out other rows and columns. "
-            "Trials with ISIs become a log first: isiw analyse.",
+            expected=f"the columns {' and '.join(_COLUMNS)}, perhaps pulse or time_s, with a comma, a semicolon or a "
+            "tab between, and a row for each pulse",
+            remedy=f"{of_mso}Keep pulses of TMS alone that count, of the visit's muscle, and leave out other rows and "
+            "columns. Trials with ISIs become a log first: isiw analyse.",
         )
+    if between != ",":  # then a comma in a number is its decimal sign
+        rows = [row | {name: (row[name] or "").replace(",", ".") for name in _COLUMNS} for row in rows]
     pulses = tuple(_pulse(path, number, row) for number, row in enumerate(rows))
     require_given(pulses)
     return pulses

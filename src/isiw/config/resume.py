@@ -68,9 +68,9 @@ def truth_of(record: SessionRecord) -> Truth:
     try:
         run = run_of_log(record)
         if run.device is not None:
-            person, _ = person_under(run.device, run.subject, run.seed)
+            person, _ = person_under(run.device, run.subject, run.seed, record.header.visit.intensity_pct_rmt)
         else:
-            person = run.subject.person(run.seed)
+            person = run.subject.person(run.seed, record.header.visit.intensity_pct_rmt)
     except (ConfigError, InvalidValueError) as error:
         return Truth(lacking=f"The true window of the simulated person is not known: {error}")
     return Truth(known=True, window=person.window(record.header.space))
@@ -79,7 +79,7 @@ def truth_of(record: SessionRecord) -> Truth:
 def device_of_log(record: SessionRecord, data: Path | None = None) -> SimulatedDevice:
     """The simulated person of a log, as a device; MEPs are put into the recorded EMG of a folder if they were."""
     run = run_of_log(record)
-    return simulated_device(run.seed, run.subject, record.header.space, data, run.device)
+    return simulated_device(run.seed, run.subject, record.header.space, record.header.visit, data, run.device)
 
 
 def read_to_resume(log: Path, config: Path | None) -> SessionRecord:

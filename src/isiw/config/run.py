@@ -64,7 +64,7 @@ class RunConfig(Section):
             `intensity_pct_rmt` and `mep_mv`, which are learnt before the first ISI.
     """
 
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, strict=True)
     log: Path | None = None
     prior: Path | None = None
     after: tuple[Path, ...] = ()

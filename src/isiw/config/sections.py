@@ -33,6 +33,7 @@ from isiw.strategy.catalogue import list_strategies, settings_for
 from isiw.strategy.threshold.curve import NamedPulses
 from isiw.subjects.after_effects import AFTER_EFFECTS, after_effect_of
 from isiw.subjects.cohorts import COHORTS, person_of
+from isiw.subjects.responses import RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.toml_files import checked
 from isiw.visit import Visit
@@ -89,12 +90,17 @@ class SimulatedConfig(BaseModel):
 
     kind: Literal["simulated", "recorded"] = "simulated"
     cohort: Annotated[str, AfterValidator(lambda name: choice("the cohort", name, COHORTS))] = "recruitment"
-    number: int = Field(default=0, ge=0, lt=10_000)
+    number: int = Field(default=0, ge=0, lt=10_000, strict=True)
     after_effect: Annotated[str, AfterValidator(lambda name: choice("the after-effect", name, AFTER_EFFECTS))] = "none"
 
-    def person(self, seed: int) -> SimulatedSubject:
-        """The simulated person."""
-        return after_effect_of(person_of(self.cohort, self.number, seed), self.after_effect, seed, self.number)
+    def person(self, seed: int, pct_rmt: float | None = None) -> SimulatedSubject:
+        """The simulated person, stimulated at the intensity that the visit states, off by as much as a cohort's is."""
+        person = after_effect_of(person_of(self.cohort, self.number, seed), self.after_effect, seed, self.number)
+        response, usual_pct_rmt = person.response, person.stated_intensity_pct_rmt
+        if pct_rmt is None or usual_pct_rmt is None or not isinstance(response, RecruitmentResponse):
+            return person
+        off_pct_rmt = response.intensity_pct_rmt - usual_pct_rmt
+        return replace(person, response=replace(response, intensity_pct_rmt=pct_rmt + off_pct_rmt))
 
 
 class SubjectConfig(SimulatedConfig):
@@ -298,9 +304,11 @@ class _RotatingTapperKeys(_TapperKeys):
     vane: Vane = field(default_factory=Vane)
 
 
-def robot_for(robot: RobotConfig, seed: int, simulated: SimulatedConfig, space: DesignSpace) -> Tapper | RotatingTapper:
+def robot_for(
+    robot: RobotConfig, seed: int, simulated: SimulatedConfig, space: DesignSpace, pct_rmt: float | None = None
+) -> Tapper | RotatingTapper:
     """The robot that taps a simulated person."""
-    person, geometry = person_under(robot, simulated, seed)
+    person, geometry = person_under(robot, simulated, seed, pct_rmt)
     hit_ms, sd_ms = person.stated_hit_delay_ms
     values = {"reference": space.reference, "expected_hit_ms": hit_ms, "expected_hit_sd_ms": sd_ms} | robot.settings
     kind = _RotatingTapperKeys if robot.kind == "rotating-tapper" else _TapperKeys
@@ -312,9 +320,11 @@ def robot_for(robot: RobotConfig, seed: int, simulated: SimulatedConfig, space: 
     return RotatingTapper(tapper, settings.vane, wait_ms=settings.wait_ms, seed=seed)
 
 
-def person_under(robot: RobotConfig, simulated: SimulatedConfig, seed: int) -> tuple[SimulatedSubject, Geometry]:
+def person_under(
+    robot: RobotConfig, simulated: SimulatedConfig, seed: int, pct_rmt: float | None = None
+) -> tuple[SimulatedSubject, Geometry]:
     """The person and the wrist under the robot, which has the person's hit delay; that varies by the robot alone."""
-    person = simulated.person(seed)
+    person = simulated.person(seed, pct_rmt)
     if simulated.kind != "simulated" or person.conditioning != "tap":
         raise ConfigError(
             "the tapping robot records its own EMG, of people who are tapped",

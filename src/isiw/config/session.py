@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from isiw.config.given import Before, Given, before_of, given_before, is_table
 from isiw.config.run import RunConfig, limits_for
-from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
+from isiw.config.sections import RobotConfig, SimulatedConfig, robot_for
 from isiw.design import DesignSpace
 from isiw.devices.info import DeviceInfo
 from isiw.devices.protocol import Device, info_of
@@ -234,16 +234,23 @@ def device_for(config: RunConfig) -> Device:
     """
     if config.device is not None and config.device.factory is not None:
         return device_from_factory(config.device.factory, config.device.settings, config.device.folder)
-    return simulated_device(config.seed, config.subject, config.space, config.subject.data, config.robot)
+    visit, person = config.visit.noted(), config.subject
+    return simulated_device(config.seed, person, config.space, visit, person.data, config.robot)
 
 
 def simulated_device(
-    seed: int, person: SimulatedConfig, space: DesignSpace, data: Path | None, robot: RobotConfig | None = None
+    seed: int, person: SimulatedConfig, space: DesignSpace, visit: Visit, data: Path | None, robot: RobotConfig | None
 ) -> SimulatedDevice:
     """The device of a simulated person."""
+    if data is not None and person.kind != "recorded":
+        raise ConfigError(
+            "recordings are for a subject of the kind recorded, and would be ignored",
+            got=str(data),
+            remedy='Add --subject recorded, or kind = "recorded" under [subject]; or leave the data out.',
+        )
     if robot is not None:
-        return SimulatedDevice(robot_for(robot, seed, person, space))
-    reference, subject = space.reference, person.person(seed)
+        return SimulatedDevice(robot_for(robot, seed, person, space, visit.intensity_pct_rmt))
+    reference, subject = space.reference, person.person(seed, visit.intensity_pct_rmt)
     respond = partial(subject.begin(seed).respond, reference=reference)
     delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
     stated: dict[str, Any] = {"hit_delay_ms": delay_ms, "conditioning": subject.conditioning}
@@ -283,7 +290,6 @@ def session_for(config: RunConfig, intervention: Intervention | None = None) -> 
         LogError: an earlier session of the person that cannot be read, or has no accepted trial.
         StrategyError: a prior for a strategy that has none of this kind.
     """
-    _require_used(config.subject)
     space = config.design()
     log = config.log or fresh_log_path(config)
     device = device_for(config)
@@ -340,15 +346,6 @@ def intervention_for(config: RunConfig) -> Session:
 def _code(config: RunConfig) -> str:
     """The code of a simulated person; empty of a real one."""
     return "" if config.own_rig else f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
-
-
-def _require_used(subject: SubjectConfig) -> None:
-    if subject.data is not None and subject.kind != "recorded":
-        raise ConfigError(
-            "recordings are for a subject of the kind recorded, and would be ignored",
-            got=str(subject.data),
-            remedy='Add --subject recorded, or kind = "recorded" under [subject]; or leave the data out.',
-        )
 
 
 def _kept(config: RunConfig) -> dict[str, Any]:

@@ -74,6 +74,7 @@ STUDY_ISI_MS = (10.0, 30.0, 50.0, 51.0, 52.0, 53.0, 54.0, 70.0, 90.0)
 TRIAL_MS = 1000.0
 CALIBRATION_TAPS = 21
 BATCH = 100
+MOST_TAPS = 100_000  # for each ISI
 MOST_ROTATIONS = 2000  # each keeps a second of angle, pressures and flows
 
 ERROR_BANDS_MS = (0.0, 1.0, 2.0, 3.0, 4.0, np.inf)
@@ -196,7 +197,7 @@ def study_preset(
     on_done: Callable[[int], None] = lambda _taps: None,
 ) -> TimingStudy:
     """Run the repeatability study on a preset of the tapping robot, open loop; `on_done` hears how many taps are."""
-    taps, seed = whole("taps", taps, least=1), whole("seed", seed, least=0)
+    taps, seed = whole("taps", taps, least=1, most=MOST_TAPS), whole("seed", seed, least=0)
     geometry, rng = preset(name), np.random.default_rng(seed)
     predicted_ms = float(np.nanmedian(_tap(geometry, np.full(CALIBRATION_TAPS, np.nan), rate_hz, rng).hit_ms))
     commanded = np.repeat(np.asarray(isi_ms, dtype=np.float64), taps) if len(isi_ms) else np.full(taps, np.nan)

@@ -122,6 +122,12 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
             remedy = "Name a folder with --output, or one of them with --only CODE."
             raise InvalidValueError(what, got=codes_of([one.delivered for one in people]), remedy=remedy)
         return [one._replace(log=Path(output)) for one in people]
+    if Path(output).suffix and not Path(output).is_dir():
+        what = "the output is neither a log nor a folder"
+        remedy = (
+            "Name a log (.mcap), or a folder for a log of each person; one with a full stop in its name make first."
+        )
+        raise InvalidValueError(what, got=str(output), remedy=remedy)
     days = [f"_day{day}" if (day := one.delivered.visit.day) else "" for one in people]
     stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]
     times = Counter(map(folded, stems))  # names that are two here may be one file on other computers

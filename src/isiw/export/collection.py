@@ -122,8 +122,8 @@ class _Copy:
     @property
     def is_left_out(self) -> bool:
         """True if the fuller log stands for it, which has all of it, or tells of the same stimuli as far as both do."""
-        if not self.alone:
-            return True
+        if not self.alone or self.record.header.imported:  # a log that was imported never goes on, in no copy
+            return not self.alone
         has_lost, known = _lacks(self.record) or _lacks(self.fuller), self.fuller.events
         has_verdicts_alone = any(event.kind in VERDICTS and event not in known for event in self.record.events)
         first, second = stimuli(self.record), stimuli(self.fuller)

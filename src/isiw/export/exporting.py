@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from isiw.checks import choice
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, os_errors
 from isiw.export.bids import write_bids
 from isiw.export.collection import Part, log_losses, numbered, pseudonymised, read_logs, stated_twice
 from isiw.export.emg import EMG
@@ -24,9 +24,10 @@ def new_folder(target: str | Path) -> Iterator[Path]:
     """A folder to write to, which takes its name once everything is in it; if anything fails it is gone."""
     place = Path(target)
     _require_free(place)
-    place.parent.mkdir(parents=True, exist_ok=True)
     beside = place.with_name(f".{place.name}.{uuid.uuid4().hex}")
-    beside.mkdir()
+    with os_errors(InvalidValueError, "the folder cannot be made", place, "Choose another one, or make room."):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        beside.mkdir()
     try:
         yield beside
         _require_free(place)

@@ -145,9 +145,11 @@ class LogWriter:
                 log._writer.flush()
                 try:
                     file.move_to(part_of(target), replacing=False)
-                except BaseException:
+                except BaseException as error:
                     if file.path == part_of(target):  # nothing is in it yet, and it would be in the way of the next try
                         file.path.unlink()
+                    if isinstance(error, FileExistsError):  # another session was faster, which has a way on of its own
+                        require_free(target)
                     raise
         return log
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from isiw import sentences, summary
-from isiw.dissertation.response_counts import by_isi, count_trials, measured_profile
+from isiw.dissertation.response_counts import TrialsByIsi, by_isi, count_trials, measured_profile
 from isiw.errors import InvalidValueError
 from isiw.figures import Edge, Estimate
 from isiw.log.continuing import imported_sentence
@@ -84,9 +84,10 @@ def correlation_sentence(record: SessionRecord, measured: SessionRecord) -> str:
         LogError: measured MEPs that would show the concealed arm of an intervention.
     """
     measured.require_open()
-    found, trials = record.found, by_isi(measured.table)
+    found, trials = record.found, _pairs_of(measured)
     if found is None or not found.profile_mv:
-        raise InvalidValueError("the log has no estimated profile", got=str(record.path))
+        remedy = "Name the log of a session with trials, of a strategy that estimates one, first."
+        raise InvalidValueError("the log has no estimated profile", got=str(record.path), remedy=remedy)
     events = record.header.space.reference, measured.header.space.reference
     if events[0] != events[1]:
         raise InvalidValueError("the logs count ISIs from different events", got=" and ".join(events))
@@ -107,13 +108,22 @@ def counts_table(record: SessionRecord, threshold_mv: float | None, share: float
         LogError: the arm of an intervention is concealed.
     """
     record.require_open()
-    study = count_trials(by_isi(record.table), threshold_mv, share)
+    study = count_trials(_pairs_of(record), threshold_mv, share)
     rows = study.counts.itertuples()
     lines = [f"{row.Index:5g} ms  {row.trials:6d}  {row.responses:9d}  {row.share:5.2f}" for row in rows]
     effective = "No ISI is effective" if study.window is None else f"Effective: {study.window}"
     alone = "" if math.isnan(study.alone_share) else f" {study.alone_share:.0%} of the trials of TMS alone exceed it."
     said = f"{effective}: more than {share:.0%} of the trials above {1e3 * study.threshold_mv:.3g} µV.{alone}"
     return "\n".join([f"{'ISI':>8}  trials  responses  share", *lines, said])
+
+
+def _pairs_of(record: SessionRecord) -> TrialsByIsi:
+    trials = by_isi(record.table)
+    if not len(trials.isi_ms):
+        raise InvalidValueError(
+            "no pair of stimuli in the log counts", got=str(record.path), remedy="Name another log."
+        )
+    return trials
 
 
 def _whose(record: SessionRecord) -> str:

@@ -260,7 +260,7 @@ class Session(Judging):
         if not self._earlier.first_records:  # what an earlier log says goes on as it was
             require_limits(self._limits)
             require_protocol(self._header.protocol, self._limits.iti_s)
-            require_signals(self._header.signals)
+            require_signals(self._header.signals, self._header.space)
             require_fitting(self.strategy, self._header)
         require_intensities(self.strategy, self._header)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from isiw.design import DesignSpace
 from isiw.devices.limits import PulseLimits
 from isiw.errors import InvalidValueError
 from isiw.findings import refused, require_percent
@@ -20,6 +21,9 @@ from isiw.visit import Visit, VisitProtocol, interval_s
 MOST_COIL_C = 60.0
 """No coil that touches a person may be as hot as that [°C]."""
 
+MOST_DAY = 9999
+"""Nobody comes so often; a date as a number is larger."""
+
 
 def require_limits(limits: PulseLimits) -> None:
     """Raise InvalidValueError if a limit limits nothing, or is probably in another unit.
@@ -27,6 +31,8 @@ def require_limits(limits: PulseLimits) -> None:
     The interval alone may keep what a rest or a period asks for, or be in ms, and no coil be as hot as its limit.
     """
     interval_s("Limits.min_iti_s", limits.iti_s)
+    require_percent("Limits.intensity_pct_mso", limits.intensity_pct_mso)
+    require_percent("Limits.max_intensity_pct_rmt", limits.max_intensity_pct_rmt)
     if limits.max_coil_c is not None and limits.max_coil_c > MOST_COIL_C:
         raise InvalidValueError(
             "Limits.max_coil_c is hotter than a coil may be that touches a person, so it would have no effect",
@@ -100,15 +106,21 @@ def require_protocol(protocol: VisitProtocol, min_iti_s: float) -> None:
 
 
 def require_visit(visit: Visit, assumed_pct_rmt: float | None = None) -> None:
-    """Raise if an intensity is probably in another unit, or not the one that the strategy assumes.
+    """Raise if the day is a date, or an intensity is probably in another unit, or not the one that is assumed.
 
     Args:
         visit: the visit.
         assumed_pct_rmt: the intensity that the strategy assumes [% RMT]; None if it assumes none.
 
     Raises:
-        InvalidValueError: an intensity below 3 %, or one other than the strategy's.
+        InvalidValueError: a day that is none, an intensity below 3 %, or one other than the strategy's.
     """
+    if visit.day is not None and visit.day > MOST_DAY:
+        raise InvalidValueError(
+            "the visit's day is the number of the person's visit, from 1, and no date",
+            got=visit.day,
+            expected=f"at most {MOST_DAY}",
+        )
     noted = visit.intensity_pct_rmt
     require_percent("the visit's intensity_pct_rmt", noted)
     require_percent("the visit's intensity_pct_mso", visit.intensity_pct_mso)
@@ -122,12 +134,20 @@ def require_visit(visit: Visit, assumed_pct_rmt: float | None = None) -> None:
         )
 
 
-def require_signals(signals: SignalLimits) -> None:
-    """Raise where the window would hold the pulse's own artefact.
+def require_signals(signals: SignalLimits, space: DesignSpace) -> None:
+    """Raise where the window would hold the pulse's own artefact, or a tolerance would have no effect.
 
     Raises:
-        InvalidValueError: the MEP window begins less than 3 ms after the pulse, as also where its first ms is in s.
+        InvalidValueError: the MEP window begins less than 3 ms after the pulse, as also where its first ms is in s; or
+            a tolerance that is wider than the space's.
     """
+    if signals.isi_tolerance_ms is not None and signals.isi_tolerance_ms > space.tolerance_ms:
+        raise InvalidValueError(
+            "SignalLimits.isi_tolerance_ms is wider than the design space's tolerance, so it would have no effect",
+            got=signals.isi_tolerance_ms,
+            expected=f"at most {space.tolerance_ms:g} ms",
+            remedy="Leave it out, or widen tolerance_ms of the design space.",
+        )
     if signals.mep_window_ms[0] < ARTEFACT_MS:
         raise InvalidValueError(
             "SignalLimits.mep_window_ms begins in the pulse's artefact, which would be measured as an MEP",

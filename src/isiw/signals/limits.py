@@ -47,11 +47,10 @@ class SignalLimits(Checked):
         if not isinstance(window_ms, Sequence) or len(window_ms) != 2:
             raise InvalidValueError(f"{name} must be its first and its last ms", got=window_ms, expected=such_as)
         _, end_ms = ascending(name, window_ms, least=0)
-        WINDOW_END_MS.require(
-            f"{name} ends before any MEP begins", end_ms, f"ms after the pulse, {such_as}", got=window_ms
-        )
-        too_quiet = "SignalLimits.background_uv is less than any amplifier's noise"
-        BACKGROUND_LIMIT_UV.require(too_quiet, self.background_uv, "µV RMS, such as 10")
+        ends_amiss = f"{name} ends before any MEP begins, or long after it"
+        WINDOW_END_MS.require(ends_amiss, end_ms, f"ms after the pulse, {such_as}", got=window_ms)
+        amiss = "SignalLimits.background_uv is less than any amplifier's noise, or more than any muscle's EMG"
+        BACKGROUND_LIMIT_UV.require(amiss, self.background_uv, "µV RMS, such as 10")
 
     @property
     def most_background_uv(self) -> float:

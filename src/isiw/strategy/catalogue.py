@@ -213,6 +213,13 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
     if isinstance(profile := profile_of(strategy.model), ProfilePrior):
         profile.require_rig(space)
     require_percent("the strategy's intensity_pct_rmt", strategy.recipe.settings.get("intensity_pct_rmt"))
+    if (several := strategy.intensities) and several.usual_pct_rmt not in several.named_pct_rmt:
+        raise InvalidValueError(
+            "no pair would have the usual intensity, at which the window is",
+            got=f"intensities_pct_rmt {', '.join(f'{pct_rmt:g}' for pct_rmt in several.named_pct_rmt)}",
+            expected=f"{several.usual_pct_rmt:g} among them",
+            remedy="Name it, too, or state another usual one, intensity_pct_rmt.",
+        )
     return strategy
 
 

@@ -56,9 +56,10 @@ class Outcome(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given = self.mep_mv, self.mep_interval_mv, self.response
-        if sum(value is not None for value in given) != 1:
-            raise InvalidValueError("tell needs one of mep_mv, mep_interval_mv and response", got=given)
+        given = [name for name in ("mep_mv", "mep_interval_mv", "response") if getattr(self, name) is not None]
+        if len(given) != 1:
+            one_of = "one of mep_mv and mep_interval_mv (or of Strategy.tell a response)"
+            raise InvalidValueError(f"an outcome needs {one_of}", got=", ".join(given) or "none of them")
 
     @classmethod
     def of(cls, trial: Trial) -> Outcome:
