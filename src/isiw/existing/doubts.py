@@ -22,7 +22,7 @@ from isiw.existing.names import (
     ALL,
     MEANS,
     TITLES_OF_MEANS,
-    is_mishap,
+    is_remark,
     is_verdict,
     key_of_flags,
     require_title,
@@ -45,7 +45,7 @@ _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tel
 _ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
 _LAST: Final = 2000  # so many rows at most are compared with those below them
-_USUAL: Final = 8  # figures are what stands below trials in most files, the first half of these in nearly all
+_USUAL: Final = 10  # figures are what stands below trials in most files, the first half of these in nearly all
 _CHANCE: Final = 0.02  # with which single trials are hardly by chance what they seem
 _NO_REMARKS: Final = WORDS["alone"] | WORDS["tap alone"] | WORDS["yes"]
 _BELOW_TRIALS: Final = "Delete the rows below the trials; if these are trials, number all in a column called trial."
@@ -79,6 +79,11 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
         require_title("\n".join([heading, *below]), mep, layout.reference, frame.attrs.get("notes", ""))
     title = TITLES_OF_MEANS.search(words_of(heading)) if once else None
     is_counted = bool(counted_in) and (once or counted_in[0] in averaged)
+    numeric = [Column(name, cells).numbers for name, cells in others.items()] if once and len(others) < _BELOW else []
+    spreads += [
+        name for name, one in zip(others, numeric, strict=False) if not np.allclose(one, mep.numbers, rtol=0.01)
+        and any(np.allclose(one + other, 2 * mep.numbers, rtol=0.01) for other in numeric)
+    ]  # fmt: skip # such as limits of confidence
     if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or is_counted:
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"
@@ -104,12 +109,6 @@ def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> N
         if (remark := next(filter(is_verdict, remarks), None)) is not None:
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
-        some = (text for text in {*column.texts} if not _NUMBER.fullmatch(text) and plain(text) not in _NO_REMARKS)
-        mishaps = {*filter(is_mishap, some)}
-        told = [row for row, text in enumerate(column.texts) if text in mishaps]
-        if 0 < _ROWS_A_WORD * len(told) <= len(column.cells) and column.name not in where:
-            remedy = f'Mark such rows in a column called exclude; if they count, say --where "{column.name}={ALL}".'
-            raise column.refused(told[0], "may say why the trial does not count", remedy)
 
 
 def require_no_summaries(columns: Columns, apart: int | None) -> None:
@@ -156,7 +155,7 @@ def _require_none_below(mep: Column, isi: Column, known: Sequence[int], apart: i
         kinds = [_figures(one) for one in (above, above[paired[:begin]], above[~paired[:begin]])]
         of_each = [float(above[isis[:begin] == isi].mean()) for isi in np.unique(isis[paired])[:_BELOW_AT_MOST]]
         usual, every = (np.concatenate([one[:most] for one in kinds]) for most in (_USUAL, None))
-        for figures in (usual[: _USUAL // 2], usual, every, np.array(of_each)):
+        for figures in (kinds[0][:4], kinds[0][4:7], usual, every, np.array(of_each)):
             are_so = np.any(abs(figures[:, None] - meps) <= slacks, axis=0)
             by_chance = max(are_so[:begin].sum() - 2, 0.5) / begin  # two are the least and the largest
             chance = float(np.prod(np.where(meps[begin:] > 2 * above.max(), _CHANCE, by_chance)))
@@ -182,10 +181,9 @@ def _figures(values: FloatArray) -> FloatArray:
     geometric = np.exp(np.log(values[values > 0]).mean()) if (values > 0).any() else 0.0
     quarters = [*np.quantile(values, [0.25, 0.75]), *statistics.quantiles(values.tolist())[::2]]
     cvs = sds / mean if mean else sds
-    usual = [mean, sds[1], values.min(), values.max(), np.median(values), sds[0], *(sds / len(values) ** 0.5)]
-    return np.array(
-        [*usual, *quarters, np.ptp(values), values.sum(), len(values), *sds**2, *cvs, *(100 * cvs), geometric]
-    )
+    usual = [mean, sds[1], values.min(), values.max(), np.median(values), geometric, np.ptp(values), sds[0]]
+    sems = sds / len(values) ** 0.5
+    return np.array([*usual, *sems, *quarters, values.sum(), len(values), *sds**2, *cvs, *(100 * cvs)])
 
 
 def require_short(delivered: Delivered, layout: Layout) -> None:
@@ -307,12 +305,22 @@ def _require_said(columns: Columns) -> None:
 
 
 def _require_one_kind(columns: Columns) -> None:
-    """Raise if an unused column has several values at each ISI, as one of muscles, people, sides or conditions has."""
+    """Raise if an unused column has remarks, or several values at each ISI, as one of muscles, people or sides has."""
     isi = columns["isi"]
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
     for name, column in columns.beside.items() if by_isi else ():
         if name in columns.layout.where:
             continue
+        times = Counter(map(column.text, columns.rows))
+        usual = max(times, key=lambda text: times[text])
+        remarks = {text for text in times if is_remark(text) and plain(text) not in _NO_REMARKS}
+        told = [row for row in columns.rows if column.text(row) in remarks]
+        is_seldom = (
+            usual not in remarks and not _NUMBER.fullmatch(usual) and _ROWS_A_WORD * len(told) <= len(columns.rows)
+        )
+        if is_seldom and told and told != columns.rows[:1]:  # one in the first row is of all
+            remedy = f'Mark such rows in a column called exclude; if they count, say --where "{name}={ALL}".'
+            raise column.refused(told[0], "may say why the trial does not count", remedy)
         texts = {row: column.text(row).casefold() for _, row in by_isi}
         alone = [row for row, text in texts.items() if " " in plain(text) and plain(text) in WORDS["alone"]]
         if alone and len({*texts.values()}) > 1:
@@ -336,10 +344,12 @@ def _seldom_states(by_isi: Sequence[tuple[float, int]], column: Column) -> list[
     texts = [column.text(row) for _, row in by_isi]
     times = Counter(filter(None, texts))
     are_states = all(texts) or all(re.fullmatch(r"\d", text) for text in times)
-    if len(times) not in {2, 3} or not are_states or min(times.values()) < _FEW:
+    if len(times) not in {2, 3} or not are_states or len({bool(_NUMBER.fullmatch(text)) for text in times}) > 1:
         return []
     said = np.array(texts) == min(times, key=lambda text: times[text])
-    has_isis = np.unique(np.array([isi_ms for isi_ms, _ in by_isi])[said]).size > 1  # or else it stands for one
+    isis_ms = np.array([isi_ms for isi_ms, _ in by_isi])
+    shared = np.isin(isis_ms[~said], isis_ms[said]).any() or np.unique(isis_ms).size == isis_ms.size
+    has_isis = np.unique(isis_ms[said]).size > 1 or (shared and min(times.values()) < _FEW)  # or else it stands for one
     return [*times] if has_isis and _are_flags(said, by_isi) and not _counts_again(column, by_isi) else []
 
 

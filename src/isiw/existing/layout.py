@@ -23,11 +23,26 @@ _FOUND: Final = {kind: {key: tuple(" ".join(word.split()) for word in text.split
 UNIT_WORDS: Final[Mapping[str, str]] = {
     word: unit for unit, words in _FOUND["units"].items() for word in words
 }  # lower case
-COLUMNS: Final[Mapping[str, tuple[str, ...]]] = _FOUND["columns"]
-WORDS: Final[Mapping[str, frozenset[str]]] = {kind: frozenset(words) for kind, words in _FOUND["words"].items()}
+_MEP, _SIZE, _WHOLE, _WITH_MEP = _FOUND["amplitudes"].values()
+
+
+def _joined(ones: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
+    return tuple(word for one in ones for other in others for word in (one + other, other + one))
+
+
+_BARE: Final = (*_SIZE, *_WHOLE, *_joined(_SIZE, _WHOLE))
+_OF_MEPS: Final = (*_MEP, *_joined(_MEP, (*_BARE, *_WITH_MEP, *_joined(_SIZE, _WITH_MEP))), *_BARE)
+COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {**_FOUND["columns"], "mep": _OF_MEPS}
+WORDS: Final[Mapping[str, frozenset[str]]] = {
+    **{kind: frozenset(words) for kind, words in _FOUND["words"].items()},
+    "vague": frozenset((*_FOUND["words"]["vague"], *_BARE)),
+}
 MARKS: Final[Mapping[str, tuple[str, str]]] = {
     "pulse": ("the pulse of TMS", "tms pulse tmspulse magneticpulse"),
-    "tap": ("the tap (its impact) or the electrical pulse", "tap impact hit electricalpulse conditioning pns"),
+    "tap": (
+        "the tap (its impact) or the electrical pulse",
+        "tap impact hit schlag hammerschlag electricalpulse conditioning pns",
+    ),
     "valve": ("the valve command", "valve valvecommand"),
     "alone": ("TMS alone", "tmsalone tmsonly singlepulse pulsealone unconditioned"),
 }
