@@ -349,7 +349,9 @@ def _seldom_states(by_isi: Sequence[tuple[float, int]], column: Column) -> list[
     said = np.array(texts) == min(times, key=lambda text: times[text])
     isis_ms = np.array([isi_ms for isi_ms, _ in by_isi])
     shared = np.isin(isis_ms[~said], isis_ms[said]).any() or np.unique(isis_ms).size == isis_ms.size
-    has_isis = np.unique(isis_ms[said]).size > 1 or (shared and min(times.values()) < _FEW)  # or else it stands for one
+    has_isis = np.unique(isis_ms[said]).size > 1 or (
+        shared and min(times.values()) < _FEW <= len(texts) / 4
+    )  # or it stands for one
     return [*times] if has_isis and _are_flags(said, by_isi) and not _counts_again(column, by_isi) else []
 
 

@@ -181,7 +181,7 @@ def _beside(table: pd.DataFrame, layout: Layout) -> tuple[str, list[int], str]:
         is_apart |= first is None and not name  # by an empty column
         few = [] if not is_apart or first is None else [first, *filled]
         at_top = 4 * len(few) <= len(table) and few == [*range(len(few))]
-        is_own = not is_apart or name in layout.columns.values() or not (at_top or not name)
+        is_own = not (is_apart and at_top) or name in layout.columns.values()
         (kept if is_own else aside).append(place)
     cells = table.iloc[:, aside]
     return _text_in([[*cells.columns], *cells.to_numpy().tolist()]).strip(), kept, " ".join(empty)

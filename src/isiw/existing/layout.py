@@ -31,7 +31,12 @@ def _joined(ones: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
 
 
 _BARE: Final = (*_SIZE, *_WHOLE, *_joined(_SIZE, _WHOLE))
-_OF_MEPS: Final = (*_MEP, *_joined(_MEP, (*_BARE, *_WITH_MEP, *_joined(_SIZE, _WITH_MEP))), *_BARE)
+_OF_MEPS: Final = (
+    *_MEP,
+    *_joined(_MEP, (*_BARE, *_WITH_MEP, *_joined(_SIZE, _WITH_MEP))),
+    *_joined(_WHOLE, _joined(_MEP, _SIZE)),
+    *_BARE,
+)
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {**_FOUND["columns"], "mep": _OF_MEPS}
 WORDS: Final[Mapping[str, frozenset[str]]] = {
     **{kind: frozenset(words) for kind, words in _FOUND["words"].items()},
