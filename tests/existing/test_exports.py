@@ -101,7 +101,7 @@ def test_isis_of_a_trigger_or_up_to_the_tap_are_asked_about(name: str, says: str
      "coil slipped, do not use", "eliminare", "not valid", "no good", "excl.", "stimulator error", "coil off"],
 )  # fmt: skip
 def test_more_remarks_leave_a_trial_out(remark: str) -> None:
-    with pytest.raises(IsiwError, match=r"row 5 of the column 'note' .* says that the trial does not count"):
+    with pytest.raises(IsiwError, match=r"row 5 of the column 'note' .* may say that the trial does not count"):
         read_people(table(note=few(remark, "")), EMPTY_IS_ALONE)
     for usual in ("not repeated", "not bad", "no artefact", "ok, no artefact"):
         assert len(trials_of(read_people(table(note=few(usual, "")), EMPTY_IS_ALONE))) == 48
@@ -126,7 +126,7 @@ def test_more_remarks_leave_a_trial_out(remark: str) -> None:
     ],
 )
 def test_remarks_of_what_may_keep_a_trial_from_counting_are_asked_about(remark: str) -> None:
-    with pytest.raises(IsiwError, match=r"row 5 of .* may say why the trial does not count.*--where \"note=\*\""):
+    with pytest.raises(IsiwError, match=r"row 5 of .* may say that the trial does not count.*--where \"note=\*\""):
         read_people(table(note=few(remark, "")), EMPTY_IS_ALONE)
     read_people(table(note=few(remark, "")), EMPTY_IS_ALONE.saying(where={"note": "*"}))
     for usual in ("pause", "entspannt", "no noise", "Block 2"):

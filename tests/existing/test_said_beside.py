@@ -64,7 +64,7 @@ def test_rows_that_excel_shows_otherwise_than_they_are_read_are_asked_about(
     [
         ({"E1": "Gain", "F1": 1000}, "says a gain"),
         ({"E2": "Filter", "F2": "10-500 Hz", "E3": "Verstärkung", "E4": 300}, "says a gain"),
-        ({"F5": "trials 4 and 17 excluded"}, "which trials do not count"),
+        ({"F5": "trials 4 and 17 excluded"}, "may say that the trial does not count"),
         ({"E1": "MEP in µV"}, "says two units"),
         ({"C1": "gain", "D1": "1000"}, "says a gain"),
         ({"E1": "Coil", "F1": "D70", "E2": "Amplifier", "F2": "D360", "E3": "gain", "F3": 1}, None),

@@ -95,7 +95,7 @@ def test_a_unit_of_no_voltage_is_not_overruled_in_silence(unit: str, is_asked: b
 )
 def test_more_remarks_beside_trials_are_asked_about(remark: str) -> None:
     noted = with_events(lambda rows: [*rows, (5.3, remark)])
-    with pytest.raises(IsiwError, match="says that a trial does not count"):
+    with pytest.raises(IsiwError, match="may say that a trial does not count"):
         read_people(noted, KNOWN)
     require_as_written(read_people(noted, KNOWN.saying(where=EVERY))[0])
 

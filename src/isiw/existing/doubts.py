@@ -6,7 +6,7 @@ import math
 import re
 import statistics
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
 from operator import itemgetter
@@ -18,17 +18,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import WORDS, Layout, letters, plain, unit_in
-from isiw.existing.names import (
-    ALL,
-    MEANS,
-    TITLES_OF_MEANS,
-    is_remark,
-    is_verdict,
-    key_of_flags,
-    require_title,
-    says_only,
-    words_of,
-)
+from isiw.existing.names import ALL, MEANS, TITLES_OF_MEANS, is_remark, is_verdict, require_title, says_only, words_of
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import BoolArray, FloatArray
@@ -91,24 +81,6 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
         expected = "a row for each trial, since the scatter of single trials says how sure a window is"
         remedy = "Export the single trials; if these are, rename the column."
         raise InvalidValueError(what, expected=expected, remedy=remedy)
-
-
-def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> None:
-    """Raise if a column of which nothing is read says that a trial does not count, in its cells or by its name."""
-    for column in beside:
-        texts = [*map(str.casefold, column.texts)] if column.name not in where else []
-        key = key_of_flags(column.name) or ("exclude" if WORDS["counted"] & {*texts} else None)
-        texts = texts if key else []
-        kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
-        odd = [row for row, text in enumerate(texts) if text in kinds]
-        are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
-        if are_flags and 0 < len(odd) < len(texts):
-            remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
-            raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
-        remarks = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
-        if (remark := next(filter(is_verdict, remarks), None)) is not None:
-            remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
-            raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
 
 
 def require_no_summaries(columns: Columns, apart: int | None) -> None:
@@ -210,7 +182,7 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 
 def require_one_kind_each(columns: Columns) -> None:
     """Raise if rows are not of one person's single trials of one muscle, in their order and in one unit."""
-    for doubt in (_require_ascending, _require_said, _require_one_kind, _require_one_intensity):
+    for doubt in (_require_ascending, _require_said, _require_no_remarks, _require_one_kind, _require_one_intensity):
         doubt(columns)
 
 
@@ -305,22 +277,12 @@ def _require_said(columns: Columns) -> None:
 
 
 def _require_one_kind(columns: Columns) -> None:
-    """Raise if an unused column has remarks, or several values at each ISI, as one of muscles, people or sides has."""
+    """Raise if an unused column has several values at each ISI, as one of muscles, people, sides or conditions has."""
     isi = columns["isi"]
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
     for name, column in columns.beside.items() if by_isi else ():
         if name in columns.layout.where:
             continue
-        times = Counter(map(column.text, columns.rows))
-        usual = max(times, key=lambda text: times[text])
-        remarks = {text for text in times if is_remark(text) and plain(text) not in _NO_REMARKS}
-        told = [row for row in columns.rows if column.text(row) in remarks]
-        is_seldom = (
-            usual not in remarks and not _NUMBER.fullmatch(usual) and _ROWS_A_WORD * len(told) <= len(columns.rows)
-        )
-        if is_seldom and told and told != columns.rows[:1]:  # one in the first row is of all
-            remedy = f'Mark such rows in a column called exclude; if they count, say --where "{name}={ALL}".'
-            raise column.refused(told[0], "may say why the trial does not count", remedy)
         texts = {row: column.text(row).casefold() for _, row in by_isi}
         alone = [row for row, text in texts.items() if " " in plain(text) and plain(text) in WORDS["alone"]]
         if alone and len({*texts.values()}) > 1:
@@ -337,6 +299,22 @@ def _require_one_kind(columns: Columns) -> None:
             remedy += f'be analysed together, or --column "subject={name}" if they are people; if one is TMS alone, '
             remedy += "write that in place of its ISIs."
             raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
+
+
+def _require_no_remarks(columns: Columns) -> None:
+    """Raise if a row has a verdict in a column that nothing else is read of, or a remark where most rows have none."""
+    rows = columns.rows
+    for column in (*columns.beside.values(), columns["condition"]):
+        times = Counter(map(column.text, rows))
+        usual, is_other = max(times, key=lambda text: times[text]), column is columns["condition"]
+        remarks = {text for text in times if is_remark(text) and plain(text) not in _NO_REMARKS}
+        told = [row for row in rows if column.text(row) in remarks]
+        is_other |= usual in remarks or bool(_NUMBER.fullmatch(usual)) or told == rows[:1] or 2 * len(told) > len(rows)
+        if is_other:  # it is of all trials, or tells kinds apart
+            told = [row for row in told if is_verdict(column.text(row))]
+        if told and column.name not in columns.layout.where:
+            remedy = f'Mark such rows in a column called exclude; if they count, say --where "{column.name}={ALL}".'
+            raise column.refused(told[0], "may say that the trial does not count", remedy)
 
 
 def _seldom_states(by_isi: Sequence[tuple[float, int]], column: Column) -> list[str]:

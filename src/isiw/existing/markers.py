@@ -158,13 +158,12 @@ def _require_no_verdicts(events: pd.DataFrame, at_s: FloatArray, layout: Layout,
     seldom = [name for name in others if _SELDOM * times[name] <= len(at_s)]
     said = {name: name.rpartition("/")[2].strip() for name in seldom if times_of(events, name).max() > at_s.min()}
     remarks = {name for name, text in said.items() if is_remark(text) and not _CODE.fullmatch(text)}
-    odd = (
-        [name for name in names_of(events) if is_verdict(name) or name in remarks] if EVENT not in layout.where else []
-    )
-    for name, onset_s, lasts_s in events[["name", "onset", "duration"]].itertuples(index=False):
+    remarks |= {*filter(is_verdict, names_of(events))}
+    every = events if EVENT not in layout.where else events[:0]
+    for name, onset_s, lasts_s in every[["name", "onset", "duration"]].itertuples(index=False):
         is_bad = re.match("(?i)bad", name) and (lasts_s > 0 or np.any(np.abs(at_s - onset_s) < _EARLY_S))
-        if name in odd and not is_bad and "boundary" not in name.casefold():
-            what = f"an event of {source} {'says' if is_verdict(name) else 'may say'} that a trial does not count"
+        if name in remarks and not is_bad and "boundary" not in name.casefold():
+            what = f"an event of {source} may say that a trial does not count"
             remedy = "Mark the trial itself by an annotation whose name begins with BAD, or remove its pulse; or say "
             remedy += f'what it marks, such as --marker "alone={name}"; if all count, say --where "{EVENT}={ALL}".'
             raise InvalidValueError(what, got=f"{name!r} at {onset_s:.3f} s", remedy=remedy)

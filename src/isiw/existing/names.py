@@ -108,7 +108,7 @@ _LISTED: Final = re.compile(
 )  # numbers of trials that do not count
 _OF_GAIN: Final = 'Divide the amplitudes by it; if they are those at the electrodes already, say --where "{}=*".'
 _HARMLESS: Final = WORDS["harmless"] | WORDS["counted"]
-_DENIED: Final = WORDS["left out"] | WORDS["flags"] | WORDS["deniable"] | WORDS["no"] | WORDS["counted"]
+_DENIED: Final = WORDS["left out"] | WORDS["flags"] | WORDS["deniable"] | WORDS["no"]
 _CLAUSES: Final = re.compile(r"[\n;]|[.,](?=\s)")
 _WORDS: Final = 4  # in a longer remark bad may be of something
 
@@ -185,6 +185,20 @@ def require_no_gain(columns: Iterable[Column], where: Mapping[str, str]) -> None
             raise column.doubted("has a gain, and nothing is read of it", odd[0], _OF_GAIN.format(column.name))
 
 
+def require_no_flags(beside: Iterable[Column], where: Mapping[str, str]) -> None:
+    """Raise if a column of which nothing is read has flags, by its name or by words of what counts."""
+    for column in beside:
+        texts = [*map(str.casefold, column.texts)] if column.name not in where else []
+        key = key_of_flags(column.name) or ("exclude" if WORDS["counted"] & {*texts} else None)
+        texts = texts if key else []
+        kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
+        odd = [row for row, text in enumerate(texts) if text in kinds]
+        are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
+        if are_flags and 0 < len(odd) < len(texts):
+            remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
+            raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
+
+
 def says_only(text: str, known: AbstractSet[str]) -> bool:
     """True if a text, besides what stands in brackets, has words of a kind alone, such as SD (mV) or Mean block 2."""
     bare = re.sub(r"[\[(].*?[\])]|\bn ?= ?\d+", " ", words_of(text))
@@ -201,16 +215,10 @@ def key_of_flags(name: str) -> str | None:
 
 
 def is_verdict(text: str) -> bool:
-    """True if a remark says that a trial does not count."""
-    said = text.casefold().partition(":")[0].strip(" !.?#*()[]>-")
-    phrases = [word for word in WORDS["left out"] if " " in word and word in said]  # such as "do not use"
-    bare = said.replace(phrases[0], " ") if phrases else said
-    words = {*(re.findall(r"\w+", bare) if said.count(" ") < _WORDS else ())}
-    known = WORDS["left out"] | WORDS["flags"]
-    if words.isdisjoint(known) and not (words.isdisjoint(WORDS["no"]) or words.isdisjoint(WORDS["counted"])):
-        return True  # such as "not valid"
-    is_said = bool(phrases) or not words.isdisjoint(known)
-    return said in known or (is_said and words.isdisjoint(WORDS["no"]))
+    """True if a short remark has a word of trials that do not count."""
+    said = text.casefold().partition(":")[0]
+    words = {*(re.findall(r"\w+", said) if said.count(" ") < _WORDS else ())}
+    return not words.isdisjoint(WORDS["left out"] | WORDS["flags"]) and words.isdisjoint(WORDS["no"])
 
 
 def is_remark(text: str) -> bool:

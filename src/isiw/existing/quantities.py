@@ -15,6 +15,7 @@ from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, W
 from isiw.existing.names import (
     ALL,
     RELATIVE,
+    require_no_flags,
     require_no_gain,
     require_of_kind,
     require_order,
@@ -122,8 +123,7 @@ class Columns:
                     for place, name in enumerate(names) if name not in used}  # fmt: skip
         beside = {name: Column(name, cells, of=source) for name, cells in cells_of.items()
                   if name in names or not all(map(is_missing, cells))}  # fmt: skip
-        doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})],
-                                   layout.where)  # fmt: skip
+        require_no_flags(beside.values(), layout.where)
         require_no_gain(beside.values(), layout.where)
         require_reference("column", "isi", columns["isi"].name, layout.reference, source)
         if columns["isi"].name not in layout.where:
