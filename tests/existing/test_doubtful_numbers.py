@@ -42,10 +42,11 @@ def few(bad: Any, good: Any) -> list[Any]:
         (MEPS / np.median(MEPS[ALONE]), "median of TMS alone is 1", STATED),
         (MEPS / MEPS.mean(), "its mean is 1", STATED),
         ((MEPS / MEPS.max()).round(3), "its largest is 1", STATED),
+        (np.log10(1e3 * MEPS), "scatters as little as logarithms do; got", STATED),
     ],
 )
 def test_amplitudes_that_are_relative_by_their_numbers_are_asked_about(meps: Any, says: str, layout: Layout) -> None:
-    with pytest.raises(IsiwError, match=rf"'MEP' of the table seems to be relative: .*{says}.*--where \"MEP=\*\""):
+    with pytest.raises(IsiwError, match=rf"'MEP' of the table .*{says}.*--where \"MEP=\*\""):
         read_people(table(meps, mep="MEP"), layout)
     kept = trials_of(read_people(table(meps, mep="MEP"), layout.saying(where={"MEP": "*"})))
     assert len(kept) == 48
@@ -130,8 +131,8 @@ def test_a_unit_that_is_stated_against_a_name_is_asked_about_until_the_name_is_s
         (few(0, 1), r"says yes or no of each pair.*--column \"exclude=x\".*--where \"x=\*\""),
         (few("x", ""), "says yes or no"),
         (few("FALSE", "TRUE"), "says yes or no"),
-        (few("double tap", ""), "says that the trial does not count"),
-        (few("amplifier saturated", ""), "says that the trial does not count"),
+        (few("double tap", ""), "may say that the trial does not count"),
+        (few("amplifier saturated", ""), "may say that the trial does not count"),
         (few("no tap", ""), "says TMS alone, and nothing is read of it"),
     ],
 )

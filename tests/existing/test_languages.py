@@ -38,7 +38,8 @@ def read(path: Path, layout: Layout = IMPACT) -> Delivered:
     [
         ("Intervalle (ms);Amplitude crête à crête (mV);Exclu", "non", "oui"),
         ("Intervalo [milisegundos];Amplitud (milivoltios);Excluido", "no", "sí"),
-        ("Intervallo (ms);Ampiezza (mV);Escluso", "no", "sì"),
+        ("Intervallo (ms);Ampiezza MEP (mV);Escluso", "no", "sì"),
+        ("Intervalle (ms);Amplitude PEM (mV);Exclu", "non", "oui"),
         ("ISI (ms);Amplitude (mV);Uitgesloten", "nee", "ja"),
         ("Reizabstand (ms);Amplitude (mV);Ausgeschlossen", "nein", "ja"),
     ],

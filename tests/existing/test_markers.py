@@ -81,7 +81,9 @@ def test_codes_of_all_pairs_and_what_comes_by_itself_are_named_and_no_more() -> 
 
 @pytest.mark.parametrize("name", ["artefact", "reject last trial", "bad"])
 def test_a_remark_beside_a_trial_that_leaves_it_out_is_asked_about(name: str) -> None:
-    with pytest.raises(IsiwError, match=rf"says that a trial does not count.*'{name}' at 5\.500 s.*--where \"event=\*"):
+    with pytest.raises(
+        IsiwError, match=rf"may say that a trial does not count.*'{name}' at 5\.500 s.*--where \"event=\*"
+    ):
         read([*EVENTS, (5.5, name)])
     assert len(isis_of(read([*EVENTS, (5.5, name)], where={"event": "*"}))) == 16
     assert len(isis_of(read([*EVENTS, (5.5, "BAD boundary")]))) == 16

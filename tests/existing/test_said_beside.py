@@ -43,7 +43,7 @@ def crossed_out(sheet: Any) -> None:
          "2 rows of the sheet 'Data' are hidden; got 'row 5, 6'.*called exclude"),
         (crossed_out, "1 row of the sheet 'Data' is crossed out; got 'row 7'"),
         (lambda sheet: setattr(sheet["A8"], "comment", openpyxl.comments.Comment("Artefakt!", "EK")),
-         "1 row of the sheet 'Data' is left out by a note; got 'row 8'"),
+         "1 row of the sheet 'Data' is with a note, .*; got 'row 8'"),
         (lambda sheet: sheet.merge_cells("B4:B6"), "an amplitude of the sheet 'Data' is merged over several rows"),
         (lambda sheet: sheet.__setitem__("B4", "=1/2"), "1 row .* without the result of a formula; got 'row 4'"),
     ],
@@ -57,6 +57,30 @@ def test_rows_that_excel_shows_otherwise_than_they_are_read_are_asked_about(
     merged = shown(tmp_path / "P03.xlsx", lambda sheet: sheet.merge_cells("A4:A6"))
     usual, of_one = (read_people(source, IMPACT)[0].trials for source in (hidden_head, merged))
     assert (len(usual), len({of_one[row].isi_ms for row in (2, 3, 4)})) == (36, 1)
+
+
+@pytest.mark.parametrize(
+    ("cells", "says"),
+    [
+        ({"E1": "Gain", "F1": 1000}, "says a gain"),
+        ({"E2": "Filter", "F2": "10-500 Hz", "E3": "Verstärkung", "E4": 300}, "says a gain"),
+        ({"F5": "trials 4 and 17 excluded"}, "may say that the trial does not count"),
+        ({"E1": "MEP in µV"}, "says two units"),
+        ({"C1": "gain", "D1": "1000"}, "says a gain"),
+        ({"E1": "Coil", "F1": "D70", "E2": "Amplifier", "F2": "D360", "E3": "gain", "F3": 1}, None),
+    ],
+)
+def test_cells_beside_a_table_are_a_title(cells: dict[str, Any], says: str | None, tmp_path: Path) -> None:
+    def change(sheet: Any) -> None:
+        for at, cell in cells.items():
+            sheet[at] = cell
+
+    path = shown(tmp_path / "P01.xlsx", change)
+    if says is None:
+        assert (len(read_people(path, IMPACT)[0].trials), read_people(path, IMPACT)[0].unused) == (36, ())
+        return
+    with pytest.raises(IsiwError, match=says):
+        read_people(path, IMPACT)
 
 
 def test_a_few_rows_of_a_colour_of_their_own_are_flags_unless_another_column_says_why(tmp_path: Path) -> None:

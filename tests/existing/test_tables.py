@@ -106,7 +106,7 @@ def test_the_mark_of_tms_alone_is_what_somebody_says(mark: str, cell: Any) -> No
 
 
 def test_columns_of_which_nothing_is_read_are_named() -> None:
-    (person,) = read_people(frame(note=["", "cough", "", "", ""], Ausschluss=["", "x", "", "", ""]), IMPACT)
+    (person,) = read_people(frame(note=["", "pause", "", "", ""], Ausschluss=["", "x", "", "", ""]), IMPACT)
     assert person.unused == ("note",)
     assert [trial.counts for trial in person.trials] == [True, False, True, True, True]
 

@@ -32,6 +32,7 @@ _WITH, _ITS_HALF, _EXACT = 0.8, 0.7, 0.02  # halves correlate so with amplitudes
 _FEW, _FEWEST = 3, 12  # in a table with fewer rows ISIs may come again by chance
 _LONG_BEFORE_MS: Final = 50.0  # no pulse is given so long before the tap
 _NO_MEP: Final = {"none", "n.d.", "k.a.", "-", "--", "–", "—", ".", "?"}  # in an amplitude's place
+_LOGS, _LOG_CV = (1.0, 12.0), 0.3  # logarithms of µV are among these, and scatter so little
 _NEAR_MS, _ALIKE = (1.0, 25.0), 0.98  # so far from each other are ISIs that were asked and measured, and so alike
 
 
@@ -166,10 +167,14 @@ def _require_absolute(columns: Columns) -> None:
     of_all = mep.numbers[rows]
     odd["mean"] = float(of_all.mean()), step / len(rows) ** 0.5, _FINE
     odd["largest"] = float(of_all.max()), step, _FINE
+    remedy = "Name the column of the amplitudes themselves: --column mep=NAME; if these are, say --where "
+    remedy += f'"{mep.name}={ALL}".'
+    are_logs = _LOGS[0] < of_all.min() < of_all.max() < _LOGS[1] and of_all.std() < _LOG_CV * of_all.mean()
+    if are_logs and len(rows) >= _FEWEST:
+        raise mep.doubted("scatters as little as logarithms do", f"{of_all.min():g} to {of_all.max():g}", remedy)
     for (what, (number, rounded, most)), one in product(odd.items(), (1.0, 100.0)):
         if rounded <= most * one and abs(number - one) <= max(rounded if "mean" in what else 0.0, 1e-9 * one):
-            remedy = "Name the column of the amplitudes themselves: --column mep=NAME; if these are, say --where "
-            expected, remedy = "peak-to-peak amplitudes in mV, µV or V", f'{remedy}"{mep.name}={ALL}".'
+            expected = "peak-to-peak amplitudes in mV, µV or V"
             raise mep.doubted(f"seems to be relative: its {what} is {one:g}", None, remedy, expected)
 
 

@@ -6,7 +6,7 @@ import math
 import re
 import statistics
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
 from operator import itemgetter
@@ -18,17 +18,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import WORDS, Layout, letters, plain, unit_in
-from isiw.existing.names import (
-    ALL,
-    MEANS,
-    TITLES_OF_MEANS,
-    is_mishap,
-    is_verdict,
-    key_of_flags,
-    require_title,
-    says_only,
-    words_of,
-)
+from isiw.existing.names import ALL, MEANS, TITLES_OF_MEANS, is_remark, is_verdict, require_title, says_only, words_of
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import BoolArray, FloatArray
@@ -45,7 +35,7 @@ _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tel
 _ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
 _LAST: Final = 2000  # so many rows at most are compared with those below them
-_USUAL: Final = 8  # figures are what stands below trials in most files, the first half of these in nearly all
+_USUAL: Final = 10  # figures are what stands below trials in most files, the first half of these in nearly all
 _CHANCE: Final = 0.02  # with which single trials are hardly by chance what they seem
 _NO_REMARKS: Final = WORDS["alone"] | WORDS["tap alone"] | WORDS["yes"]
 _BELOW_TRIALS: Final = "Delete the rows below the trials; if these are trials, number all in a column called trial."
@@ -79,6 +69,11 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
         require_title("\n".join([heading, *below]), mep, layout.reference, frame.attrs.get("notes", ""))
     title = TITLES_OF_MEANS.search(words_of(heading)) if once else None
     is_counted = bool(counted_in) and (once or counted_in[0] in averaged)
+    numeric = [Column(name, cells).numbers for name, cells in others.items()] if once and len(others) < _BELOW else []
+    spreads += [
+        name for name, one in zip(others, numeric, strict=False) if not np.allclose(one, mep.numbers, rtol=0.01)
+        and any(np.allclose(one + other, 2 * mep.numbers, rtol=0.01) for other in numeric)
+    ]  # fmt: skip # such as limits of confidence
     if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or is_counted:
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"
@@ -86,30 +81,6 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
         expected = "a row for each trial, since the scatter of single trials says how sure a window is"
         remedy = "Export the single trials; if these are, rename the column."
         raise InvalidValueError(what, expected=expected, remedy=remedy)
-
-
-def require_no_verdicts(beside: Iterable[Column], where: Mapping[str, str]) -> None:
-    """Raise if a column of which nothing is read says that a trial does not count, in its cells or by its name."""
-    for column in beside:
-        texts = [*map(str.casefold, column.texts)] if column.name not in where else []
-        key = key_of_flags(column.name) or ("exclude" if WORDS["counted"] & {*texts} else None)
-        texts = texts if key else []
-        kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
-        odd = [row for row, text in enumerate(texts) if text in kinds]
-        are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
-        if are_flags and 0 < len(odd) < len(texts):
-            remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
-            raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
-        remarks = dict.fromkeys(cell for cell in column.cells if isinstance(cell, str))
-        if (remark := next(filter(is_verdict, remarks), None)) is not None:
-            remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
-            raise column.refused(column.cells.index(remark), "says that the trial does not count", remedy)
-        some = (text for text in {*column.texts} if not _NUMBER.fullmatch(text) and plain(text) not in _NO_REMARKS)
-        mishaps = {*filter(is_mishap, some)}
-        told = [row for row, text in enumerate(column.texts) if text in mishaps]
-        if 0 < _ROWS_A_WORD * len(told) <= len(column.cells) and column.name not in where:
-            remedy = f'Mark such rows in a column called exclude; if they count, say --where "{column.name}={ALL}".'
-            raise column.refused(told[0], "may say why the trial does not count", remedy)
 
 
 def require_no_summaries(columns: Columns, apart: int | None) -> None:
@@ -156,7 +127,7 @@ def _require_none_below(mep: Column, isi: Column, known: Sequence[int], apart: i
         kinds = [_figures(one) for one in (above, above[paired[:begin]], above[~paired[:begin]])]
         of_each = [float(above[isis[:begin] == isi].mean()) for isi in np.unique(isis[paired])[:_BELOW_AT_MOST]]
         usual, every = (np.concatenate([one[:most] for one in kinds]) for most in (_USUAL, None))
-        for figures in (usual[: _USUAL // 2], usual, every, np.array(of_each)):
+        for figures in (kinds[0][:4], kinds[0][4:7], usual, every, np.array(of_each)):
             are_so = np.any(abs(figures[:, None] - meps) <= slacks, axis=0)
             by_chance = max(are_so[:begin].sum() - 2, 0.5) / begin  # two are the least and the largest
             chance = float(np.prod(np.where(meps[begin:] > 2 * above.max(), _CHANCE, by_chance)))
@@ -182,10 +153,9 @@ def _figures(values: FloatArray) -> FloatArray:
     geometric = np.exp(np.log(values[values > 0]).mean()) if (values > 0).any() else 0.0
     quarters = [*np.quantile(values, [0.25, 0.75]), *statistics.quantiles(values.tolist())[::2]]
     cvs = sds / mean if mean else sds
-    usual = [mean, sds[1], values.min(), values.max(), np.median(values), sds[0], *(sds / len(values) ** 0.5)]
-    return np.array(
-        [*usual, *quarters, np.ptp(values), values.sum(), len(values), *sds**2, *cvs, *(100 * cvs), geometric]
-    )
+    usual = [mean, sds[1], values.min(), values.max(), np.median(values), geometric, np.ptp(values), sds[0]]
+    sems = sds / len(values) ** 0.5
+    return np.array([*usual, *sems, *quarters, values.sum(), len(values), *sds**2, *cvs, *(100 * cvs)])
 
 
 def require_short(delivered: Delivered, layout: Layout) -> None:
@@ -212,7 +182,7 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 
 def require_one_kind_each(columns: Columns) -> None:
     """Raise if rows are not of one person's single trials of one muscle, in their order and in one unit."""
-    for doubt in (_require_ascending, _require_said, _require_one_kind, _require_one_intensity):
+    for doubt in (_require_ascending, _require_said, _require_no_remarks, _require_one_kind, _require_one_intensity):
         doubt(columns)
 
 
@@ -331,15 +301,35 @@ def _require_one_kind(columns: Columns) -> None:
             raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
 
 
+def _require_no_remarks(columns: Columns) -> None:
+    """Raise if a row has a verdict in a column that nothing else is read of, or a remark where most rows have none."""
+    rows = columns.rows
+    for column in (*columns.beside.values(), columns["condition"]):
+        times = Counter(map(column.text, rows))
+        usual, is_other = max(times, key=lambda text: times[text]), column is columns["condition"]
+        remarks = {text for text in times if is_remark(text) and plain(text) not in _NO_REMARKS}
+        told = [row for row in rows if column.text(row) in remarks]
+        is_other |= usual in remarks or bool(_NUMBER.fullmatch(usual)) or told == rows[:1] or 2 * len(told) > len(rows)
+        if is_other:  # it is of all trials, or tells kinds apart
+            told = [row for row in told if is_verdict(column.text(row))]
+        if told and column.name not in columns.layout.where:
+            remedy = f'Mark such rows in a column called exclude; if they count, say --where "{column.name}={ALL}".'
+            raise column.refused(told[0], "may say that the trial does not count", remedy)
+
+
 def _seldom_states(by_isi: Sequence[tuple[float, int]], column: Column) -> list[str]:
     """Two or three numbers, or words of all, of which one is seldom, and not of a range of ISIs, as a state may be."""
     texts = [column.text(row) for _, row in by_isi]
     times = Counter(filter(None, texts))
     are_states = all(texts) or all(re.fullmatch(r"\d", text) for text in times)
-    if len(times) not in {2, 3} or not are_states or min(times.values()) < _FEW:
+    if len(times) not in {2, 3} or not are_states or len({bool(_NUMBER.fullmatch(text)) for text in times}) > 1:
         return []
     said = np.array(texts) == min(times, key=lambda text: times[text])
-    has_isis = np.unique(np.array([isi_ms for isi_ms, _ in by_isi])[said]).size > 1  # or else it stands for one
+    isis_ms = np.array([isi_ms for isi_ms, _ in by_isi])
+    shared = np.isin(isis_ms[~said], isis_ms[said]).any() or np.unique(isis_ms).size == isis_ms.size
+    has_isis = np.unique(isis_ms[said]).size > 1 or (
+        shared and min(times.values()) < _FEW <= len(texts) / 4
+    )  # or it stands for one
     return [*times] if has_isis and _are_flags(said, by_isi) and not _counts_again(column, by_isi) else []
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, Layout, letters, unit_named
-from isiw.existing.names import doubtful_words, is_verdict
+from isiw.existing.names import doubtful_words, is_remark
 from isiw.existing.quantities import require_one, unit_said
 from isiw.lazy import pd
 from isiw.opening import opened
@@ -165,8 +165,26 @@ def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.Data
             remedy += "has samples, describe it in a layout, as docs/your-data.md does (--layout)."
             raise InvalidValueError(what, got=" | ".join(map(str, row[: len(names) + 2])), remedy=remedy)
     table = pd.DataFrame([[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body], columns=names)
-    table.attrs["title"] = title
+    beside, kept, notes = _beside(table, layout)
+    table = table.iloc[:, kept]
+    table.attrs |= {"title": f"{title}\n{beside}", "notes": notes}
     return table
+
+
+def _beside(table: pd.DataFrame, layout: Layout) -> tuple[str, list[int], str]:
+    """What stands in cells to the right of a table, its own columns, and the names of those that are empty."""
+    aside, kept, empty, is_apart = list[int](), list[int](), list[str](), False
+    for place, name in enumerate(table.columns):
+        filled = (n for n, cell in enumerate(table.iloc[:, place]) if not is_missing(cell))
+        if (first := next(filled, None)) is None:
+            empty += [] if is_apart else [name]
+        is_apart |= first is None and not name  # by an empty column
+        few = [] if not is_apart or first is None else [first, *filled]
+        at_top = 4 * len(few) <= len(table) and few == [*range(len(few))]
+        is_own = not (is_apart and at_top) or name in layout.columns.values()
+        (kept if is_own else aside).append(place)
+    cells = table.iloc[:, aside]
+    return _text_in([[*cells.columns], *cells.to_numpy().tolist()]).strip(), kept, " ".join(empty)
 
 
 def _text_in(rows: Iterable[Sequence[Any]]) -> str:
@@ -266,7 +284,7 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
             rows[0] = [f"{name} ({unit})" if unit else name for name, unit in pairs]
             break
     table = _table(rows, layout, titles[chosen])
-    table.attrs["notes"] = "\n".join(f"{titles[name]}\n{_text_in(sheets[name])}" for name in sheets if name != chosen)
+    table.attrs["notes"] += "\n".join(f"{titles[name]}\n{_text_in(sheets[name])}" for name in sheets if name != chosen)
     return table
 
 
@@ -316,11 +334,11 @@ def _require_whole(book: Any, sheet: str, head: int) -> tuple[list[str], list[in
         (row, "".join(_TEXT.findall(note.decode())).rpartition(":\n")[2])
         for row, note in _NOTE.findall(b"".join(notes))
     ]
-    left_out = "|".join(row.decode() for row, note in said if is_verdict(note))
+    left_out = "|".join(row.decode() for row, note in said if is_remark(note))
     crossed, coloured = _styled(book, lambda font, _: font.strike), _styled(book, _is_coloured)
     noted = rf'<row [^>]*?r="({left_out})"' if left_out else "(?!)"
     for pattern, are, remedy in (
-        *_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT), (noted, "left out by a note", _COUNT)
+        *_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT), (noted, "with a note, as of what happened", _COUNT)
     ):  # fmt: skip
         found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
         if rows := [str(row) for row in sorted(found) if row > head]:

@@ -16,7 +16,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, says_alone
 from isiw.existing.doubts import kinds_at_each
 from isiw.existing.layout import ISI_UNITS_MS, MARKS, Layout, plain
-from isiw.existing.names import ALL, is_mishap, is_verdict
+from isiw.existing.names import ALL, is_remark, is_verdict
 from isiw.existing.quantities import isis_of, require_one
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
@@ -29,6 +29,7 @@ _FEW: Final = 3  # so many pulses after an event, at different times, are hardly
 EVENT: Final = "event"  # what `where` calls the events of which nothing else is read
 _NONE: Final = "no event"
 _OF_NONE: Final = re.compile("(?i)bad|sweep$|edge|.*boundary|.*new segment")  # events of no stimuli
+_CODE: Final = re.compile(r"[^\W\d]{1,2}|(?=.*\d)\W*([^\W\d_]*[\W\d_]+)?[^\W\d_]*")  # a name that is no remark
 _ISI: Final = re.compile(r"(?i)isi[\W_]{0,2}(\d+(?:[.,]\d+)?) ?(ms|s)?(?![^\W_])")  # what a name says
 _ODD_MS: Final = 10.0  # a hammer is not so much later or earlier than usual
 _EARLY_S: Final = 20e-3  # a pulse at most so long before a tap was meant to follow it, and is TMS before the impact
@@ -155,12 +156,14 @@ def _require_no_verdicts(events: pd.DataFrame, at_s: FloatArray, layout: Layout,
     """Raise if a remark beside a trial says that it does not count; one that begins with BAD may span it."""
     others, times = _others(events, layout), Counter(events["name"].astype(str))
     seldom = [name for name in others if _SELDOM * times[name] <= len(at_s)]
-    odd = [name for name in names_of(events) if is_verdict(name) or (name in seldom and is_mishap(name))]
-    odd = odd if EVENT not in layout.where else []
-    for name, onset_s, lasts_s in events[["name", "onset", "duration"]].itertuples(index=False):
+    said = {name: name.rpartition("/")[2].strip() for name in seldom if times_of(events, name).max() > at_s.min()}
+    remarks = {name for name, text in said.items() if is_remark(text) and not _CODE.fullmatch(text)}
+    remarks |= {*filter(is_verdict, names_of(events))}
+    every = events if EVENT not in layout.where else events[:0]
+    for name, onset_s, lasts_s in every[["name", "onset", "duration"]].itertuples(index=False):
         is_bad = re.match("(?i)bad", name) and (lasts_s > 0 or np.any(np.abs(at_s - onset_s) < _EARLY_S))
-        if name in odd and not is_bad and "boundary" not in name.casefold():
-            what = f"an event of {source} {'says' if is_verdict(name) else 'may say'} that a trial does not count"
+        if name in remarks and not is_bad and "boundary" not in name.casefold():
+            what = f"an event of {source} may say that a trial does not count"
             remedy = "Mark the trial itself by an annotation whose name begins with BAD, or remove its pulse; or say "
             remedy += f'what it marks, such as --marker "alone={name}"; if all count, say --where "{EVENT}={ALL}".'
             raise InvalidValueError(what, got=f"{name!r} at {onset_s:.3f} s", remedy=remedy)

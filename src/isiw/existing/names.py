@@ -19,7 +19,7 @@ MEANS: Final = re.compile(
     r"means?|average|avg|median|mittel(wert)?|moyen(ne)?s?|promedios?|\bmedi[ae]\b|gemiddelden?|\bn ?= ?\d+"
 )
 TITLES_OF_MEANS: Final = re.compile(
-    r"\b(means?|averages?|averaged|avg|mittelwerte?|moyennes?|promedios?|medi[ae]|gemiddelden?)\b"
+    r"\b(means?|averages?|averaged|avg|mittelwerte?|gemittelte?n?|moyennes?|promedios?|medi[ae]|gemiddelden?)\b"
 )  # what the names of files and sheets, and titles, say of means
 _ORIGINS: Final = {
     "impact": r"valve|ventil|\bcommand|\bcmd\b|solenoid|vanne|v[aá]lvula|valvola|\bklep|actuator",
@@ -45,9 +45,9 @@ _MEASURES: Final = (
     r"\b[mµμu]?v([²/]| ?[*·×] ?m?s\b|m?s\b)"
 )
 _ENDS: Final = rf"^(?!.*({WHOLE})).*\b(trough|max|maximum|min|minimum)\b"
-_GAIN: Final = r"\bgain(?![^\W\d])|amplifi(ed|cation)|verstärk"
+_GAIN: Final = r"\bgain(?![^\W\d])|\bamplifi?(ed|cat|cac|caz)|verstärk|\bganancia|\bganho|\bguadagno|\bversterking"
 _A_GAIN: Final = re.compile(
-    rf"({_GAIN})\w*\W*((factor|of|by|x|=)\W*)*(?!1(\.0*)?\b)\d+|\b\d+ ?(x|fold|fach|times)\w* ({_GAIN})"
+    rf"({_GAIN})\w*\W*([^\W\d_]+\W+){{0,2}}x?(?!1(\.0*)?\b)\d+|\b\d+ ?(x|fold|fach|times)\w* ({_GAIN})"
 )  # with a number that is not 1
 _AT_ELECTRODES: Final = re.compile("at the electrode|an den elektroden|corrected|referred|rückgerechnet|korrigiert")
 _POWER: Final = r"10 ?[\^⁺⁻⁰¹²³⁴-⁹]"
@@ -90,8 +90,8 @@ _ANY_TITLES: Final = {
     r"\b(meps|sweeps|trials|frames|pulses) (averaged|gemittelt)\W*(?!1\b)\d": "to be means of several trials",
 }  # what a title says in whatever clause
 _TITLES: Final = {
-    r"%|per ?cent|prozent|pour ?cent|por ?ciento|\bz-? ?scor|\blog\w*[- ](transf|of|mep|amp)|\blogarithm|\bratios?\b|"
-    r"divided by|geteilt durch|"
+    r"%|per ?cent|prozent|pour ?cent|por ?ciento|\bz-? ?scor|\b(log|ln)s?\d*\b(?! ?(file|book|sheet))|\blogar|"
+    r"transform|square root|\bratios?\b|divided by|geteilt durch|"
     r"\brel(ative)? to\b(?! (the )?(\w+ )?(impact|tap|hit|valve|pulse|onset|stimul))|\bmultiples? of\b|\bfold\b|"
     rf"bezogen auf|par rapport|\bm ?max\b|[/÷] ?{_BASES}\b": "to be relative",
     rf"\bmep areas?\b|rectified|{_HALVES}": "to be of another measure",
@@ -107,8 +107,8 @@ _LISTED: Final = re.compile(
     rf"\b(trials?|sweeps?|versuche?|nr|essais?)\W+{_NUMBER}(\W+(and |und |et )?\d+)*\W+(\w+\W+){{0,2}}{_LEFT_OUT}\b"
 )  # numbers of trials that do not count
 _OF_GAIN: Final = 'Divide the amplitudes by it; if they are those at the electrodes already, say --where "{}=*".'
-_MISHAPS: Final = re.compile("|".join(WORDS["mishaps"]))
-_LACKS: Final = re.compile("|".join(WORDS["lacks"]))
+_HARMLESS: Final = WORDS["harmless"] | WORDS["counted"]
+_DENIED: Final = WORDS["left out"] | WORDS["flags"] | WORDS["deniable"] | WORDS["no"]
 _CLAUSES: Final = re.compile(r"[\n;]|[.,](?=\s)")
 _WORDS: Final = 4  # in a longer remark bad may be of something
 
@@ -185,12 +185,26 @@ def require_no_gain(columns: Iterable[Column], where: Mapping[str, str]) -> None
             raise column.doubted("has a gain, and nothing is read of it", odd[0], _OF_GAIN.format(column.name))
 
 
+def require_no_flags(beside: Iterable[Column], where: Mapping[str, str]) -> None:
+    """Raise if a column of which nothing is read has flags, by its name or by words of what counts."""
+    for column in beside:
+        texts = [*map(str.casefold, column.texts)] if column.name not in where else []
+        key = key_of_flags(column.name) or ("exclude" if WORDS["counted"] & {*texts} else None)
+        texts = texts if key else []
+        kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
+        odd = [row for row, text in enumerate(texts) if text in kinds]
+        are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
+        if are_flags and 0 < len(odd) < len(texts):
+            remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
+            raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
+
+
 def says_only(text: str, known: AbstractSet[str]) -> bool:
     """True if a text, besides what stands in brackets, has words of a kind alone, such as SD (mV) or Mean block 2."""
     bare = re.sub(r"[\[(].*?[\])]|\bn ?= ?\d+", " ", words_of(text))
     words = [word for word in re.findall(r"\w+", bare) if word not in WORDS["beside spreads"]]
     words = [word for n, word in enumerate(words) if n == 0 or not re.fullmatch(r"[a-z]?\d+", word)]
-    return bool(words) and ({*words} <= known or "".join(words) in known)
+    return bool(words) and ({*words} <= known or "".join(words).rstrip("0123456789") in known)
 
 
 def key_of_flags(name: str) -> str | None:
@@ -201,20 +215,14 @@ def key_of_flags(name: str) -> str | None:
 
 
 def is_verdict(text: str) -> bool:
-    """True if a remark says that a trial does not count."""
-    said = text.casefold().partition(":")[0].strip(" !.?#*()[]>-")
-    phrases = [word for word in WORDS["left out"] if " " in word and word in said]  # such as "do not use"
-    bare = said.replace(phrases[0], " ") if phrases else said
-    words = {*(re.findall(r"\w+", bare) if said.count(" ") < _WORDS else ())}
-    known = WORDS["left out"] | WORDS["flags"]
-    if words.isdisjoint(known) and not (words.isdisjoint(WORDS["no"]) or words.isdisjoint(WORDS["counted"])):
-        return True  # such as "not valid"
-    is_said = bool(phrases) or not words.isdisjoint(known)
-    return said in known or (is_said and words.isdisjoint(WORDS["no"]))
+    """True if a short remark has a word of trials that do not count."""
+    said = text.casefold().partition(":")[0]
+    words = {*(re.findall(r"\w+", said) if said.count(" ") < _WORDS else ())}
+    return not words.isdisjoint(WORDS["left out"] | WORDS["flags"]) and words.isdisjoint(WORDS["no"])
 
 
-def is_mishap(text: str) -> bool:
-    """True if a remark says what may keep a trial from counting, such as noise, a movement, or that no tap came."""
-    said = " ".join(text.casefold().split())
-    is_denied = not WORDS["no"].isdisjoint(re.findall(r"\w\w+", said))
-    return bool(_LACKS.search(said) or (_MISHAPS.search(said) and not is_denied))
+def is_remark(text: str) -> bool:
+    """True if a text is neither a number nor known to be harmless, as a pause is, or an artefact that did not come."""
+    words = {*re.findall(r"[^\W\d_]+", text.casefold())}
+    known = _HARMLESS if words.isdisjoint(WORDS["no"]) else _DENIED
+    return not words <= known if words else bool(text) and not re.search(r"\d", text)

@@ -15,6 +15,7 @@ from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, W
 from isiw.existing.names import (
     ALL,
     RELATIVE,
+    require_no_flags,
     require_no_gain,
     require_of_kind,
     require_order,
@@ -122,8 +123,7 @@ class Columns:
                     for place, name in enumerate(names) if name not in used}  # fmt: skip
         beside = {name: Column(name, cells, of=source) for name, cells in cells_of.items()
                   if name in names or not all(map(is_missing, cells))}  # fmt: skip
-        doubts.require_no_verdicts([*beside.values(), *(columns[key] for key in columns.keys() & {"condition"})],
-                                   layout.where)  # fmt: skip
+        require_no_flags(beside.values(), layout.where)
         require_no_gain(beside.values(), layout.where)
         require_reference("column", "isi", columns["isi"].name, layout.reference, source)
         if columns["isi"].name not in layout.where:
@@ -263,11 +263,14 @@ def unit_of(name: str, frame: pd.DataFrame) -> str:
 
 
 def _units_above(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
-    """The unit that the title says of ISIs or amplitudes, such as "times in s", if a column's name says none."""
+    """The unit that a title says of ISIs or amplitudes, such as "MEP in µV", or "in s" if no column's name does."""
     known = {"isi": {**ISI_UNITS_MS, "samples": 1.0}, "mep": EMG_UNITS}.get(key, {})
-    title = str(frame.attrs.get("title", ""))
-    found = [unit for word in re.findall(r"(?i)\bin ([^\W\d_]+)", title) if (unit := unit_named(word)) in known]
-    return {} if not found or unit_said(name, known) else {"": str(found[0])}
+    said = re.findall(
+        r"(?i)([^\W\d_]+?)s?(?: are| is| sind| ist)? in ([^\W\d_]+)", f" - {frame.attrs.get('title', '')}"
+    )
+    found = [unit for of, word in said if (unit := unit_named(word)) in known
+             and (letters(of) in COLUMNS[key] or not unit_said(name, known))]  # fmt: skip
+    return {"": str(found[0])} if found else {}
 
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:

@@ -21,9 +21,7 @@ from isiw.existing.names import ALL, key_of_flags, words_of
 from isiw.lazy import pd, scipy
 from isiw.text.named_code import library
 
-_OF_TRIALS: Final = re.compile(
-    r"^(?!n\b|num|count).*(trial|sweep|frame|idx|ind(ex|ices))"
-)  # a number that may be one's own
+_OF_TRIALS: Final = re.compile(r"^(?!n\b|num|count).*(trial|sweep|frame|idx|ind(ex|ices))")  # that may be one's number
 
 
 def read(path: Path, layout: Layout) -> Contents:
@@ -67,9 +65,7 @@ def _require_no_factor(arrays: Mapping[str, Any], numbers: Mapping[str, float], 
         if not words or number in {0, 1} or not (are_steps or "gain" in words) or {*arrays} & layout.where.keys():
             continue
         what = f"{other!r} of {source} says a factor, and nothing is read of it"
-        remedy = (
-            "Save the numbers times it, or divided by it, and without it; if they are those at the electrodes already, "
-        )
+        remedy = "Save the numbers times it, or divided by it, and without it; if they are those at the electrodes, "
         remedy += f'say --where "{name or "NAME"}={ALL}"{"" if name else " with the name of the amplitudes"}.'
         raise InvalidValueError(what, got=f"{number:g}", remedy=remedy)
 
@@ -134,9 +130,8 @@ def _vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
         what = "the file has no vectors that could be the columns of a table"
         remedy = "Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
         raise InvalidValueError(what, got=", ".join(arrays) or "nothing that can be read", remedy=remedy)
-    alone = {
-        name: array.ravel() for name, array in arrays.items() if array.size == 1 and _OF_TRIALS.search(words_of(name))
-    }
+    single = {name: array.ravel() for name, array in arrays.items() if array.size == 1}
+    alone = {name: array for name, array in single.items() if _OF_TRIALS.search(words_of(name))}
     for name, vector in {**vectors, **alone}.items():
         is_longer = np.any(vector > (name not in alone)) if vector.dtype.kind in "iuf" else False
         if len(vector) != longest and is_longer and key_of_flags(name):

@@ -47,8 +47,8 @@ def _require_whole_markers(path: Path) -> None:
 def of_raw(raw: Any, source: str = "the recording") -> Contents:
     """The channels of an `mne.io.Raw`, its annotations, and what stim channels have besides."""
     rate_hz = float(raw.info["sfreq"])
-    noted = [(str(one["description"]), (float(one["onset"]) - raw.first_time) * rate_hz, float(one["duration"]))
-             for one in raw.annotations]  # fmt: skip
+    noted = [(str(one["description"]).removeprefix("Comment/"), (float(one["onset"]) - raw.first_time) * rate_hz,
+              float(one["duration"])) for one in raw.annotations]  # fmt: skip
     stretches = parted((round(at) for name, at, _ in noted if _PAUSE.search(name)), raw.n_times, rate_hz)
 
     def part(index: int, first: int, last: int) -> Any:
