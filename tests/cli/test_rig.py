@@ -16,6 +16,7 @@ from typer.testing import CliRunner, Result
 from cli.conftest import Command
 from isiw.cli import app
 from isiw.config import load_config, session_for
+from isiw.config.session import device_for
 from isiw.log.record import read_session
 
 pytestmark = pytest.mark.usefixtures("blank_pictures")
@@ -284,12 +285,13 @@ def test_recordings_that_would_be_ignored_are_refused(isiw: Command, tmp_path: P
 def test_a_log_that_was_made_before_slips_were_refused_is_read_and_goes_on(
     isiw: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("isiw.config.session._require_used", lambda _subject: None)
     for place in ("isiw.session.stated", "isiw.strategy.catalogue"):
         monkeypatch.setattr(f"{place}.require_percent", lambda *_: None)
     short = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
     (tmp_path / "c.toml").write_text(short, encoding="utf-8")
     config = load_config(tmp_path / "c.toml")
+    device = device_for(config)
+    monkeypatch.setattr("isiw.config.session.device_for", lambda _config: device)
     slips = {"subject": config.subject.model_copy(update={"data": tmp_path}),
              "visit": replace(config.visit, intensity_pct_rmt=1.2)}  # fmt: skip
     session_for(config.model_copy(update={**slips, "log": tmp_path / "old.mcap"})).run()
