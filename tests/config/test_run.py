@@ -388,6 +388,9 @@ def test_the_same_pulses_in_two_files_are_refused_whatever_the_files_are_called(
         twice = load_config(config_file(f'after = ["FCR-P07.mcap"]\nearlier = [{earlier}]\n{VISIT}'))
         with pytest.raises(ConfigError, match=r"same pulses, which would count twice.*Leave one out"):
             given_before(twice)
+    (tmp_path / "other.csv").write_text("intensity_pct_rmt,mep_mv\n120,0.4\n130,1.1\n")  # alike in size alone
+    alike = load_config(config_file(f'earlier = ["curve.csv", "other.csv"]\n{VISIT}'))
+    assert len(given_before(alike).pulses) == 4
 
 
 def test_a_search_of_another_muscle_or_person_is_refused_and_one_without_a_muscle_is_named(

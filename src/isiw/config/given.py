@@ -74,16 +74,19 @@ def given_before(config: RunConfig) -> Given:
 
 def _require_each_once(searches: Sequence[ThresholdRecord], tables: Sequence[_Table]) -> None:
     """Raise if two tables, or a table and a log, are of the same pulses, whatever they are called."""
-    of_logs = [(search.path, [outcome.mep_mv for outcome in search.outcomes]) for search in searches]
-    of_tables = [(path, [pulse.mep_mv for pulse in pulses]) for path, pulses in tables]
-    for first, second in itertools.combinations([*of_logs, *of_tables], 2):
-        if second in of_tables and first[1] == second[1] and any(second[1]):
-            raise ConfigError(
-                "two files are of the same pulses, which would count twice",
-                got=f"{first[0]} and {second[0]}",
-                expected="each pulse once",
-                remedy="Leave one out.",
-            )
+    same = [
+        (search.path, path)
+        for search, (path, pulses) in itertools.product(searches, tables)
+        if [outcome.mep_mv for outcome in search.outcomes] == [pulse.mep_mv for pulse in pulses]
+    ]
+    same += [(path, other) for (path, pulses), (other, others) in itertools.combinations(tables, 2) if pulses == others]
+    if same:
+        raise ConfigError(
+            "two files are of the same pulses, which would count twice",
+            got=" and ".join(map(str, same[0])),
+            expected="each pulse once",
+            remedy="Leave one out.",
+        )
 
 
 def _require_searches(config: RunConfig, searches: Sequence[ThresholdRecord]) -> None:
