@@ -1,4 +1,4 @@
-"""Who knows a recorded person's law: all but start and width of the window.
+"""Who knows a recorded person's law: all but start and width of the window; and all else, but not the law.
 
 Known are the impact, the boost, the form of the profile, and of each intensity a histogram of amplitudes and their
 mean: those of the smoothed law that trials are drawn from, or of the half that they are not drawn from. It designs by
@@ -7,7 +7,8 @@ greedy mutual information on a 5 ms grid and reports the level set of largest po
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final, cast
 
 import numpy as np
 from scipy.stats import norm
@@ -17,6 +18,11 @@ from benchmarks.recorded_people import ADDED_MV, STARTS_MS, WIDTHS_MS, Bank, Rec
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.excess import least_excess_mv
+from isiw.models.particles.changes import ChangePrior
+from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ProfilePrior, ShapeShares, Width
+from isiw.models.shared.scales import Scale
+from isiw.models.shared.start import Span, StartPrior
 from isiw.subjects import SimulatedSubject
 from isiw.types import FloatArray
 
@@ -34,6 +40,34 @@ def windows() -> tuple[FloatArray, FloatArray, FloatArray]:
     shares = np.diff(below, prepend=0.0, append=1.0)  # what is clipped lies at the ends
     start, width = (x.ravel() for x in np.meshgrid(starts_ms, widths_ms, indexing="ij"))
     return start, width, np.tile(shares, len(starts_ms)) / len(starts_ms)
+
+
+WINDOWS: Final = ProfilePrior(
+    p_window=0.999,  # everybody has one; a probability of 1 would leave no particle without
+    shapes=ShapeShares(1.0, 0.0, 0.0, 0.0),
+    start=StartPrior(spans=(Span(1.0, *STARTS_MS),), p_anywhere=0.0),
+    widths=(Width(1.0, Scale(*WIDTHS_MS[:2])),),
+    early=(),
+)
+NEARLY = 0.05
+"""How far from the truth a boost that is known may be, natural log."""
+
+
+def all_but_the_law(subject: SimulatedSubject) -> Prior:
+    """The default's prior of responses, with all that who knows the law knows besides, but for the impact.
+
+    Args:
+        subject: the person.
+    """
+    usual, boost_pct = Prior(), Scale(cast("RecordedResponse", subject.response).boost_pct_rmt, NEARLY)
+    return replace(
+        usual,
+        profile=WINDOWS,
+        muscles=tuple(replace(muscle, boost_pct=boost_pct) for muscle in usual.muscles),
+        rectified=replace(usual.rectified, boost_pct=boost_pct),
+        session=replace(usual.session, drift_sd=NEARLY, far_drift_share=0.0),
+        changes=ChangePrior(level=0.0, intensity=0.0, enhancement=0.0, scale=0.0),
+    )
 
 
 def _logs(amplitudes_mv: FloatArray) -> FloatArray:

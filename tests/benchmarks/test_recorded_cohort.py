@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from benchmarks.recorded_cohort import LAW, TOO_GOOD, Chunk, RecordedSession, chunks, main
+from benchmarks.recorded_cohort import ELSE, LAW, TOO_GOOD, Chunk, RecordedSession, chunks, main
 from benchmarks.recorded_law import BINS, SPREAD_EVENLY, histograms, windows
 from benchmarks.recorded_people import ADDED_MV, Bank, RecordedPerson, RecordedResponse, banks, smoothed
 from benchmarks.recorded_tables import error_by_person, sure_and_wrong
@@ -135,12 +136,12 @@ def test_without_the_recordings_it_says_so(tmp_path: Path, capsys: pytest.Captur
 
 @pytest.mark.slow
 def test_the_command_writes_its_tables(made_up: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    main(people=4, seed=5, given="0", trials=10, workers=1, data=made_up, out=tmp_path / "result")
+    main(people=4, seed=5, given="0", trials=10, workers=1, data=made_up, out=tmp_path / "result", known=True)
     written = (tmp_path / "result.md").read_text(encoding="utf-8")
     assert written in capsys.readouterr().out
     titles = ("By pairs", "At the stopping rule", "Without any pair", "By person", "What it believes")
     assert all(f"## {title}\n" in written for title in titles)
-    assert LAW in written
+    assert {LAW, ELSE} <= set(re.findall(r"(?m)^\| (\S[^|]*?) +\|", written))
     assert TOO_GOOD not in written
 
 
