@@ -10,11 +10,12 @@
     python -m benchmarks.before_and_now honest before now --out benchmarks/results/realities
     python -m benchmarks.before_and_now speed ../before/src src > benchmarks/results/before_and_now_speed.md
     python -m benchmarks.before_and_now session ../before/src src > benchmarks/results/session_speed.md
+    python -m benchmarks.before_and_now first ../before/src src > benchmarks/results/first_trials.md
 
 `run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both, `stops` where
 the stopping rule of each ends, `honest` how often each is sure and wrong; `speed` and `session` have both run the same
-sessions in turn. The hit delay is stated where a version can be told it.
-Reported people come from seed 100,000 on; seeds below 1,000 are for work.
+sessions in turn, and `first` a process that ends after three trials, once with nothing compiled before. The hit delay
+is stated where a version can be told it. Reported people come from seed 100,000 on; seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import os
 import platform
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -184,8 +186,13 @@ def speed(
 
 def _of_lap(source: Path, lap: str, seed: int) -> list[float]:
     """The numbers that a lap with the isiw in a folder prints."""
-    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "benchmarks.before_and_now", lap, str(seed)]
+    return _printed(source, "-m", "benchmarks.before_and_now", lap, str(seed))
+
+
+def _printed(source: Path, *arguments: str, **more: str) -> list[float]:
+    """The numbers that Python prints with the isiw in a folder, with more in its environment."""
+    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"} | more
+    command = [sys.executable, *arguments]
     ended = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)  # noqa: S603 - this file
     return [float(number) for number in ended.stdout.split()]
 
@@ -210,6 +217,47 @@ def session(
     )
     print("  decision after each, and the 99th percentile of ask + tell in 200 trials\n")
     print(pd.DataFrame(rows).sort_values(["", "seed"]).to_markdown(index=False, floatfmt=".2f"))
+
+
+FIRST = r"""
+import isiw, re, time
+strategy = isiw.make_strategy("default", isiw.VALVE_SPACE, int({seed}))
+for mep_mv in (0.02, 0.3, 0.05):
+    strategy.tell(strategy.ask(), mep_mv)
+    strategy.decision()
+(held_kb,) = re.findall(r"VmHWM:\s+(\d+)", open("/proc/self/status").read())
+print(time.process_time(), int(held_kb) / 1024)
+"""
+"""Three trials of a new process under Linux: its processor time [s], and the most memory that it held [MB].
+
+The maximum that `getrusage` has may be the memory of the process that began this one."""
+
+
+@app.command()
+def first(
+    before: Annotated[Path, typer.Argument(help="Folder src of the other version.")],
+    now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
+    laps: Annotated[int, typer.Option(help="How often each begins with nothing compiled, and again.")] = 4,
+) -> None:
+    """Print what the first three trials of a new process take, each version in turn."""
+    rows = []
+    for number in range(laps):
+        order = (before, now) if number % 2 == 0 else (now, before)
+        spent = {source: _first_trials(source, number) for source in order}
+        for what, old, new in zip(("first use [s]", "warm [s]", "memory [MB]"), spent[before], spent[now], strict=True):
+            rows.append({"": what, "seed": number, "before": old, "now": new, "ratio": old / new})
+    print(f"- command: `{command_of('before_and_now')}`")
+    print(f"- {made_with('torch', 'numba')}; {platform.machine()}, one thread")
+    print("- processor time of a process that imports isiw, runs three trials with a decision after each, and ends;")
+    print("  on first use nothing was compiled before; the most memory that it held when warm\n")
+    print(pd.DataFrame(rows).sort_values(["", "seed"]).to_markdown(index=False, floatfmt=".2f"))
+
+
+def _first_trials(source: Path, seed: int) -> list[float]:
+    """Processor time on first use and then [s], and the memory then [MB], with the isiw in a folder."""
+    with tempfile.TemporaryDirectory() as empty:
+        unused, warm = (_printed(source, "-c", FIRST.format(seed=seed), NUMBA_CACHE_DIR=empty) for _ in range(2))
+    return [unused[0], *warm]
 
 
 @app.command(hidden=True)
