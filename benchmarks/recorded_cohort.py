@@ -5,12 +5,13 @@
 The recordings lie in no repository of ours: `--data`, or the variable ISIW_SHARED_DATA, names their folder. `--given
 0,10,30,60,600` gives the default so many single pulses of the same law first, and has one who takes the law from these
 and knows all else but start and width; `--known` adds the default with all that who knows the law knows besides (that
-there is a window, the law of windows, form, impact and boost, and that nothing changes), but not the law; `--fitted`
-adds the default with the prior that `benchmarks.response_prior` fitted to all other persons. `--banks coils` draws from
-both curves of a coil, trials from every second pulse and what is known from the other half. `--made-up 10` puts hands
-of the default's own law in the place of who was recorded, so many pulses a level. Sessions are kept beside the result
-as they finish, and the same command continues where it was interrupted. Standard errors are by bootstrap over the ten
-persons, each with all banks. Seeds below 1,000 are for work.
+there is a window, the law of windows, form, impact and boost, and that nothing changes), but not the law; `--searched`
+adds the default after a search for the motor threshold of the same law; `--fitted` adds the default with the prior that
+`benchmarks.response_prior` fitted to all other persons. `--banks coils` draws from both curves of a coil, trials from
+every second pulse and what is known from the other half. `--made-up 10` puts hands of the default's own law in the
+place of who was recorded, so many pulses a level. Sessions are kept beside the result as they finish, and the same
+command continues where it was interrupted. Standard errors are by bootstrap over the ten persons, each with all banks.
+Seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ MARKS: Final = (0, 10, 15, 20, 30, 40)
 LAW: Final = "who knows the law"
 TOO_GOOD: Final = "law and draws from the same half (too good)"
 ELSE: Final = "default that knows all but the law"
+SEARCHED: Final = "default, after a search for the motor threshold"
 FITTED: Final = "default, prior fitted to the other persons"
 IMPACT_SD_MS: Final = 1.0
 """How far from the truth an impact that is known may be [ms]."""
@@ -59,7 +61,7 @@ class RecordedSession:
 
     Args:
         person: the person.
-        strategy: `default`, `ELSE`, `FITTED`, `LAW` or `TOO_GOOD`.
+        strategy: `default`, `SEARCHED`, `ELSE`, `FITTED`, `LAW` or `TOO_GOOD`.
         given: how many single pulses are given first.
         trials: how many pairs are delivered.
         fit: numbers of the default's prior, of `FITTED` alone.
@@ -97,6 +99,8 @@ class RecordedSession:
         strategy = isiw.make_strategy("default", SPACE, seed, **known)
         for intensity_pct_rmt, mep_mv in self.person.single_pulses(self.given):
             strategy.tell(None, mep_mv, intensity_pct_rmt=intensity_pct_rmt)
+        if self.strategy == SEARCHED:
+            strategy.learn_all(self.person.searched_pulses())
         return strategy
 
     def rows(self) -> list[dict[str, Any]]:
@@ -160,6 +164,7 @@ def chunks(
     folds: Mapping[int, Fit] | None = None,
     *,
     known: bool = False,
+    searched: bool = False,
 ) -> list[Chunk]:
     """All sessions: the default with so many pulses first, with fitted priors, and who knows the law, also from them.
 
@@ -172,10 +177,12 @@ def chunks(
         folder: where rows are kept.
         folds: the fit without each person; None for no fitted priors.
         known: also the default that knows all but the law.
+        searched: also the default after a search for the motor threshold.
     """
     plan = [("default", count) for count in given] + [(LAW, count) for count in sorted({0, *given})]
     if people[0].bank.kernel_log_sds is None:
         plan.append((TOO_GOOD, 0))
+    plan += [(SEARCHED, 0)] * searched
     plan += [(ELSE, count) for count in given if known]
     plan += [(FITTED, count) for count in given if folds]
     fits = folds or {}
@@ -208,6 +215,9 @@ def main(  # noqa: PLR0913, PLR0917 - options of a command line
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("recorded_cohort"),
     *,
     known: Annotated[bool, typer.Option("--known", help="Also the default that knows all but the law.")] = False,
+    searched: Annotated[
+        bool, typer.Option("--searched", help="Also the default after a search for the threshold.")
+    ] = False,
 ) -> None:
     """Compare the default with who knows the law, on recorded people."""
     data = data or recordings()
@@ -219,7 +229,10 @@ def main(  # noqa: PLR0913, PLR0917 - options of a command line
     folder = out.with_suffix(f".{seed}-{trials}-{banks}{'' if made_up is None else f'-{made_up}'}.sessions")
     folder.mkdir(parents=True, exist_ok=True)
     folds = None if fitted is None else read_folds(json.loads(fitted.read_text(encoding="utf-8")))
-    units, found = chunks(cohort, [int(each) for each in given.split(",")], trials, folder, folds, known=known), []
+    units, found = (
+        chunks(cohort, [int(each) for each in given.split(",")], trials, folder, folds, known=known, searched=searched),
+        [],
+    )
     with Progress() as progress:
         bar = progress.add_task("sessions", total=len(units))
         for _, result in Processes(workers).results(Chunk.run, units):

@@ -19,8 +19,10 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 import pandas as pd
 
+from isiw.strategy.threshold import IntensityRange, make_threshold_search
 from isiw.subjects import EmgFloor, PeakProfile, RecruitmentResponse, SimulatedSubject, TrialNoise
 from isiw.subjects.responses import log_normal
+from isiw.trials import Status, Trial
 from isiw.types import ArrayLike, FloatArray
 
 FOLDER: Final = "ISIW_SHARED_DATA"
@@ -42,6 +44,9 @@ LEAST_MV: Final = 2e-4
 """No smaller amplitude is drawn: no amplifier shows it, and a strategy refuses it [mV]."""
 LEAST_PULSES, LEAST_LEVELS = 3, 5
 """Curves with fewer pulses at a level, or with fewer levels, are left out."""
+
+RMT_PCT_MSO, MOST_SEARCHED = 50.0, 60
+"""The motor threshold in searches for it, as recordings have intensities in % of it [% MSO], and their most pulses."""
 
 Half: TypeAlias = Literal["drawn", "other"]
 Banks: TypeAlias = Literal["curves", "coils"]
@@ -272,3 +277,23 @@ class RecordedPerson:
         levels = self.bank.levels_pct_rmt
         by_level = tuple(np.array([mep_mv for at, mep_mv in pulses if at == level]) for level in levels.tolist())
         return replace(self.bank, amplitudes_mv=by_level, kernel_log_sds=None)
+
+    def searched_pulses(self) -> list[Trial]:
+        """Pulses of a Bayesian search for the motor threshold, from the bank or its other half; none if it found none.
+
+        As `isiw run --after` has them, their intensities are shares of the threshold that the search found.
+        """
+        rng, half = np.random.default_rng([self.seed, self.number, 4]), self.bank.half("other")
+        search = make_threshold_search("bayes", IntensityRange(20, 100))
+        while not search.decision().stop and len(search.pulses) < MOST_SEARCHED:
+            pct_mso = search.ask()
+            place = float(half.places(100.0 * pct_mso / RMT_PCT_MSO))
+            search.tell(pct_mso, half.drawn_mv(place, rng))
+        found_pct_mso = search.estimate().threshold_pct_mso
+        if found_pct_mso is None:
+            return []
+        return [
+            Trial(number, Status.ACCEPTED, None, mep_mv=pulse.mep_mv, intensity_pct_rmt=100.0 * pct_mso / found_pct_mso)
+            for number, pulse in enumerate(search.pulses)
+            if (pct_mso := pulse.intensity_pct_mso) is not None
+        ]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from benchmarks.recorded_cohort import ELSE, LAW, TOO_GOOD, Chunk, RecordedSession, chunks, main
+from benchmarks.recorded_cohort import ELSE, LAW, SEARCHED, TOO_GOOD, Chunk, RecordedSession, chunks, main
 from benchmarks.recorded_law import BINS, SPREAD_EVENLY, histograms, windows
 from benchmarks.recorded_people import ADDED_MV, Bank, RecordedPerson, RecordedResponse, banks, smoothed
 from benchmarks.recorded_tables import error_by_person, sure_and_wrong
@@ -64,6 +64,15 @@ def test_single_pulses_are_of_the_other_half_and_the_first_of_many_are_the_few(m
     assert many[:10] == few
     assert {mv for _, mv in many} <= other
     assert [level for level, _ in many].count(90.0) == 12
+
+
+def test_pulses_of_a_search_are_shares_of_the_threshold_that_it_found(made_up: Path) -> None:
+    person = RecordedPerson(0, 5, made_up, banks="coils")
+    pulses = person.searched_pulses()
+    other = {mv for level in person.bank.half("other").amplitudes_mv for mv in level.tolist()}
+    assert {pulse.mep_mv for pulse in pulses} <= other
+    above = [(pulse.mep_mv or 0.0) > 0.05 for pulse in pulses if abs((pulse.intensity_pct_rmt or 0.0) - 100.0) < 5.0]
+    assert 0.2 < np.mean(above) < 0.8
 
 
 def test_a_curve_begins_where_the_numbers_of_pulses_do(made_up: Path) -> None:
@@ -136,12 +145,22 @@ def test_without_the_recordings_it_says_so(tmp_path: Path, capsys: pytest.Captur
 
 @pytest.mark.slow
 def test_the_command_writes_its_tables(made_up: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    main(people=4, seed=5, given="0", trials=10, workers=1, data=made_up, out=tmp_path / "result", known=True)
+    main(
+        people=4,
+        seed=5,
+        given="0",
+        trials=10,
+        workers=1,
+        data=made_up,
+        out=tmp_path / "result",
+        known=True,
+        searched=True,
+    )
     written = (tmp_path / "result.md").read_text(encoding="utf-8")
     assert written in capsys.readouterr().out
     titles = ("By pairs", "At the stopping rule", "Without any pair", "By person", "What it believes")
     assert all(f"## {title}\n" in written for title in titles)
-    assert {LAW, ELSE} <= set(re.findall(r"(?m)^\| (\S[^|]*?) +\|", written))
+    assert {LAW, ELSE, SEARCHED} <= set(re.findall(r"(?m)^\| (\S[^|]*?) +\|", written))
     assert TOO_GOOD not in written
 
 
