@@ -58,7 +58,7 @@ def drawn(record: SessionRecord) -> dict[str, Any]:
 def _dotted(record: SessionRecord) -> str:
     """The meaning of the dotted lines in a sweep, in a sentence."""
     first = record.header.stimulus
-    if first.by_valve or any(trial.t_valve_ms is not None for trial in record.table):
+    if any(trial.t_valve_ms is not None for trial in record.table):
         return f"Dotted orange lines: valve command and {first.mark}."
     return f"Dotted orange line: {first.mark}."
 
