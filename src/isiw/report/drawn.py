@@ -65,9 +65,10 @@ def _dotted(record: SessionRecord) -> str:
 
 def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
     row = trial_row(trial, record.header.stimulus)
+    counts = "counts" if trial.intensity_pct_rmt is None else "other"  # the profile is that at the usual intensity
     return {
         "number": trial.index,
-        "kind": "mistrial" if trial.reason is not None else "excluded" if trial.excluded else "counts",
+        "kind": "mistrial" if trial.reason is not None else "excluded" if trial.excluded else counts,
         "isAlone": trial.is_control and not trial.tap_alone and trial.isi_ms is None,
         "asked": row.asked,
         "realised": row.realised,
