@@ -23,8 +23,8 @@ from isiw.cli.console import (
     counting,
     errors_reported,
     exit_if_damaged,
-    show,
     refuse_ignored,
+    show,
     ticking,
     working,
 )
