@@ -366,12 +366,15 @@ def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, sp
     before = posterior.estimate()
     for count in (1, 2, 23):
         isi_ms = np.linspace(space.low_ms, space.high_ms, count, dtype=np.float32)
+        kept_ms = isi_ms.copy()
         scores = _array("scores", acquisition(posterior, isi_ms))
+        require(np.array_equal(isi_ms, kept_ms), "the ISIs are left as they are", str(isi_ms.tolist()))
         people = people_of(posterior, isi_ms)
         alike = scores.shape in {(count,), (1, count)}  # for all people
         shaped = alike or (scores.ndim == 2 and scores.shape == (people or len(scores), count))
         of = "" if people is None else f" of {counted(people, 'person', 'people')}"
         require(shaped, "scores have the shape (t,) or (b, t)", f"{scores.shape} for {counted(count, 'ISI')}{of}")
+        require(scores.dtype.kind in "biuf", "scores are numbers", str(scores.dtype))
         require(bool(np.isfinite(scores).all()), "scores are finite", str(scores.tolist()))
         require(np.array_equal(scores, acquisition(posterior, isi_ms)), "the same posterior gives the same scores")
     require(same_estimates(posterior.estimate(), before), "scoring leaves the posterior as it was")
