@@ -86,9 +86,9 @@ def test_what_a_posterior_hands_out_can_be_written_into_without_changing_it(name
     for isi_ms in (60.0, 240.0, 250.0):
         strategy.tell(isi_ms, 0.1)
     posterior: Any = strategy.posterior
-    isi_ms = VALVE_SPACE.grid_ms[::20].astype(np.float32)
-    handed_out = [posterior.baselines_mv, lambda: posterior.profiles_mv(isi_ms)]
-    handed_out += [lambda: posterior.window_masks(isi_ms), lambda: posterior.outcome_mass(isi_ms)]
+    few_ms = VALVE_SPACE.grid_ms[::20].astype(np.float32)
+    handed_out = [posterior.baselines_mv, lambda: posterior.profiles_mv(few_ms)]
+    handed_out += [lambda: posterior.window_masks(few_ms), lambda: posterior.outcome_mass(few_ms)]
     for hand_out in handed_out:
         before = hand_out().copy()
         hand_out()[...] = -1.0

@@ -122,6 +122,15 @@ class Broken:
                 crowd, chance = after.swarm.crowd, 20 * np.random.default_rng().random()
                 by_chance = crowd._replace(log_weights=crowd.log_weights + chance * crowd.log_likelihood)
                 return replace(after, swarm=replace(after.swarm, crowd=by_chance))
+            case "makes nothing":
+                return None  # type: ignore[return-value]
+            case "writes into the trial":
+                observation.mep_mv[...] = 0.0
+                return after
+            case "writes into the posterior":
+                for changed in fields(posterior) if posterior.trials else ():
+                    object.__setattr__(posterior, changed.name, getattr(after, changed.name))
+                return after
             case "forgets the first":
                 return after if after.trials > 1 else posterior
             case "predicts backwards":
@@ -133,6 +142,9 @@ class Broken:
     ("fault", "promise"),
     [
         ("counts twice", "one trial more"),
+        ("makes nothing", "makes a posterior"),
+        ("writes into the trial", "leaves the observation"),
+        ("writes into the posterior", "learnt from one trial more|never changes"),
         ("depends on chance", "same seed and trials"),
         ("forgets the first", "one trial more"),
         pytest.param("weighs by the order", "order", marks=pytest.mark.slow),

@@ -50,7 +50,7 @@ class Choice:
 
 @cache
 def candidate_isis(space: DesignSpace) -> Singles:
-    """Evenly spaced ISIs to score [ms], both ends included, shape (t,); one array for all, whose holders leave it as it is."""
+    """Evenly spaced ISIs to score [ms], both ends included, shape (t,); one array for all, so that nobody may write."""
     grid = space.grid_ms
     stride = max(1, math.ceil((len(grid) - 1) / (MAX_CANDIDATES - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})

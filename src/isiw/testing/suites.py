@@ -167,13 +167,21 @@ def _after(model: ResponseModel, space: DesignSpace, trials: Trials, people: int
 
 
 def _check_learning(model: ResponseModel, space: DesignSpace, trials: Trials) -> None:
-    before = model.begin(space, 1)
-    require(isinstance(before, Posterior), "a posterior has trials and estimate()")
-    require(before.trials == 0, "a prior has learnt from no trials")
-    estimate = before.estimate()
-    after = model.update(before, _observation(*trials[0]))
-    require(after.trials == 1 and before.trials == 0, "update makes a posterior that has learnt from one trial more")
-    require(same_estimates(before.estimate(), estimate), "a posterior never changes")
+    posterior = model.begin(space, 1)
+    require(isinstance(posterior, Posterior), "a posterior has trials and estimate()", shown(posterior))
+    require(posterior.trials == 0, "a prior has learnt from no trials")
+    for told, trial in enumerate(trials[:2]):  # many write into the posterior from the second trial on
+        estimate, observation = posterior.estimate(), _observation(*trial)
+        check_estimate(estimate, space, f"after {counted(told, 'trial')}")
+        after = model.update(posterior, observation)
+        require(isinstance(after, Posterior), "update makes a posterior", shown(after))
+        require(
+            (after.trials, posterior.trials) == (told + 1, told), "update makes one that has learnt from one trial more"
+        )
+        require(same_estimates(posterior.estimate(), estimate), "a posterior never changes")
+        left = np.array_equal([observation.isi_ms, observation.mep_mv], np.array(trial, dtype=np.float32)[:, None])
+        require(left, "update leaves the observation as it is")
+        posterior = after
 
 
 def _check_order(model: ResponseModel, space: DesignSpace, trials: Trials, tolerance_ms: float) -> None:
