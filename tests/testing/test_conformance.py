@@ -126,16 +126,14 @@ class Broken:
                 return None  # type: ignore[return-value]
             case "writes into the trial":
                 observation.mep_mv[...] = 0.0
-                return after
             case "writes into the posterior":
                 for changed in fields(posterior) if posterior.trials else ():
                     object.__setattr__(posterior, changed.name, getattr(after, changed.name))
-                return after
             case "forgets the first":
                 return after if after.trials > 1 else posterior
-            case "predicts backwards":
-                return after
-        return self.model.update(posterior, replace(observation, mep_mv=observation.mep_mv * after.trials**4))
+            case "weighs by the order":
+                return self.model.update(posterior, replace(observation, mep_mv=observation.mep_mv * after.trials**4))
+        return after
 
 
 @pytest.mark.parametrize(
