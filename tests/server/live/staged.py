@@ -14,7 +14,7 @@ FAULT = {
     "do": "See that the stimulator is disarmed. Then resume with: isiw resume isiw-sessions/P07.mcap session.toml",
     "what": "the device does not answer: USB device vanished. The pulse of trial 7 may have been given, and counts.",
 }
-UNPROTECTED = "My rig is not protected if isiw dies: what is armed then stays armed. Keep the switch of the stimulator at hand."
+UNPROTECTED = "My rig is not protected if isiw dies: what is armed then stays armed. Keep the switch at hand."
 REASON = "3 mistrials in a row: no impact. Is the hammer free, and the accelerometer plugged in?"
 
 
