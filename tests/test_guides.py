@@ -11,6 +11,7 @@ import pytest
 from benchmarks.reduction.redraw import reproduction
 
 import isiw
+from isiw.acquisition.registry import ACQUISITIONS
 from isiw.config import load_config
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -54,9 +55,9 @@ def test_the_configuration_is_valid(tmp_path: Path) -> None:
     assert config.strategy.settings["max_trials"] == tomllib.loads(block)["strategy"]["settings"]["max_trials"]
 
 
-def test_every_strategy_is_in_the_table() -> None:
+def test_every_strategy_and_acquisition_function_is_in_the_tables() -> None:
     rows = "".join(line for line in text_of("strategies.md").splitlines() if line.startswith("| `"))
-    assert [name for name in isiw.list_strategies() if f"`{name}`" not in rows] == []
+    assert [name for name in (*isiw.list_strategies(), *ACQUISITIONS) if f"`{name}`" not in rows] == []
 
 
 def test_the_page_says_of_the_reproduction_what_its_report_says_first() -> None:

@@ -95,6 +95,13 @@ def test_run_of_another_study_into_the_folder_is_refused(plan: Path, folder: Pat
     assert study("run", plan, "--out", folder.with_name("other"), "--workers", 0).exit_code == 1
 
 
+def test_an_option_that_would_be_ignored_is_refused(folder: Path) -> None:
+    for given in (("replay", folder, 1, "--person", 3), ("run", folder, "--scheduler", "tcp://h:1", "--workers", 3)):
+        result = study(*given)
+        assert result.exit_code == 1
+        assert f"got '{given[-2]}'. Leave these options out." in result.output
+
+
 def test_replay_says_that_a_unit_is_identical(folder: Path) -> None:
     result = study("replay", folder, "even.gaussian.00001")
     assert result.exit_code == 0, result.output

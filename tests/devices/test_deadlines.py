@@ -142,6 +142,20 @@ def test_a_late_answer_is_kept_apart(punctual: MakePunctual, released: threading
     assert wrapped.late_answer(30.0) == Measurement(0.2, 50.0)
 
 
+def test_a_delivery_that_fails_in_time_is_not_said_to_have_failed_after_its_deadline() -> None:
+    def nothing(_: Stimulus) -> Measurement:
+        raise DeviceTimeoutError("no recording")
+
+    said: list[str] = []
+    wrapped = PunctualDevice(ScriptedDevice(nothing), report=said.append)
+    wrapped.stage()
+    with pytest.raises(DeviceTimeoutError, match="no recording"):
+        wrapped.deliver(STIMULUS, 30.0)
+    assert wrapped.late_answer(0.0) is None
+    assert said == []
+    wrapped.unstage()
+
+
 def test_an_answer_that_was_late_when_somebody_looked_is_late(punctual: MakePunctual) -> None:
     def answer(stimulus: Stimulus) -> Measurement:
         time.sleep(2 * SHORT_S)  # the delivery itself is what takes too long

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,13 @@ def test_a_session_is_a_row_that_says_what_it_is_and_found(log: Path, tmp_path: 
     assert math.isinf(row["end_high_ms"])
     assert row["counts_threshold_mv"] == 0.05
     assert row["why"] == "The budget of 6 stimuli is used up."
+
+
+def test_stimuli_before_a_session_stand_beside_its_own(log: Path) -> None:
+    record = read_session(log)
+    after = replace(record, header=record.header.model_copy(update={"earlier_given": 16}))
+    assert [session_facts(one)["given_before"] for one in (record, after)] == [0, 16]
+    assert session_facts(after)["delivered"] == 6
 
 
 def test_every_column_is_explained(log: Path, tmp_path: Path) -> None:

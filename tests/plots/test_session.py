@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord
 from isiw.plots.session import BELOW_THE_MEAN, save_session_plot, session_figure
+from isiw.report.drawn import drawn
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import make_strategy
@@ -145,6 +146,15 @@ def test_mistrials_are_where_they_happened_and_trials_are_counted_as_in_the_log(
     assert line(edges, "start of the window, with 90 % interval")[0] == [
         estimate.trial for estimate in record.estimates
     ]
+
+
+def test_pulses_at_another_intensity_are_told_apart_as_the_profile_is_not_theirs(record: SessionRecord) -> None:
+    strong = replace(record.table[0], index=90, isi_ms=50.0, mep_mv=0.9, intensity_pct_rmt=120.0)
+    there = replace(record, history=(*record.history, strong))
+    profile = session_figure(there).axes[0]
+    assert line(profile, "trial at another intensity") == ([50.0], [900.0])
+    assert 50.0 not in line(profile, "trial")[0]
+    assert [trial["kind"] for trial in drawn(there)["trials"] if trial["number"] == 90] == ["other"]
 
 
 def test_mistrials_without_an_mep_are_at_the_lower_edge_and_named(record: SessionRecord) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,12 @@ def test_where_nothing_can_be_said_it_is_said_why(record: SessionRecord) -> None
     assert comparison_sentence(difference) == (
         "P07 (s.mcap) against P07 (s.mcap), different subject codes: There is probably no window: s.mcap."
     )
+
+
+def test_without_a_subject_code_it_is_not_said_that_the_codes_differ(record: SessionRecord) -> None:
+    unnamed = replace(record, header=record.header.model_copy(update={"subject": ""}))
+    said = comparison_sentence(Difference(unnamed, record, same_person=False, starts_later=0.9, ends_later=0.9))
+    assert "perhaps the same person, as not both have a subject code:" in said
 
 
 def test_a_session_whose_trials_were_judged_anew_says_so(record: SessionRecord) -> None:

@@ -70,6 +70,31 @@ def test_scores_are_numbers(three: Posterior, scores: Any) -> None:
         best_choices(three, Scores(scores), FIVE, told=2, people=3)
 
 
+def test_an_acquisition_function_that_writes_into_the_isis_spoils_no_other_ask(three: Posterior) -> None:
+    class Writes(Scores):
+        def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
+            isi_ms *= 0.0
+            return super().__call__(posterior, isi_ms)
+
+    best_choices(three, Writes(np.zeros(5)), FIVE, told=2, people=3)
+    assert candidate_isis(FIVE).tolist() == FIVE.grid_ms.tolist()
+
+
+@pytest.mark.parametrize("name", ["default", "supra-threshold", "gp-straddle", "parametric-window"])
+def test_what_a_posterior_hands_out_can_be_written_into_without_changing_it(name: str) -> None:
+    strategy = make_strategy(name, VALVE_SPACE, seed=1)
+    for isi_ms in (60.0, 240.0, 250.0):
+        strategy.tell(isi_ms, 0.1)
+    posterior: Any = strategy.posterior
+    few_ms = VALVE_SPACE.grid_ms[::20].astype(np.float32)
+    handed_out = [posterior.baselines_mv, lambda: posterior.profiles_mv(few_ms)]
+    handed_out += [lambda: posterior.window_masks(few_ms), lambda: posterior.outcome_mass(few_ms)]
+    for hand_out in handed_out:
+        before = hand_out().copy()
+        hand_out()[...] = -1.0
+        assert np.array_equal(hand_out(), before)
+
+
 def test_each_person_is_asked_what_scores_best_and_falls_back_alone(three: Posterior) -> None:
     nan = math.nan
     scores = Scores(np.array([[0.0, 1, 0, 0, 0], [nan, nan, nan, nan, nan], [nan, 0, 0, 0, 2.0]]))

@@ -122,17 +122,27 @@ class Broken:
                 crowd, chance = after.swarm.crowd, 20 * np.random.default_rng().random()
                 by_chance = crowd._replace(log_weights=crowd.log_weights + chance * crowd.log_likelihood)
                 return replace(after, swarm=replace(after.swarm, crowd=by_chance))
+            case "makes nothing":
+                return None  # type: ignore[return-value]
+            case "writes into the trial":
+                observation.mep_mv[...] = 0.0
+            case "writes into the posterior":
+                for changed in fields(posterior) if posterior.trials else ():
+                    object.__setattr__(posterior, changed.name, getattr(after, changed.name))
             case "forgets the first":
                 return after if after.trials > 1 else posterior
-            case "predicts backwards":
-                return after
-        return self.model.update(posterior, replace(observation, mep_mv=observation.mep_mv * after.trials**4))
+            case "weighs by the order":
+                return self.model.update(posterior, replace(observation, mep_mv=observation.mep_mv * after.trials**4))
+        return after
 
 
 @pytest.mark.parametrize(
     ("fault", "promise"),
     [
         ("counts twice", "one trial more"),
+        ("makes nothing", "makes a posterior"),
+        ("writes into the trial", "leaves the observation"),
+        ("writes into the posterior", "learnt from one trial more|never changes"),
         ("depends on chance", "same seed and trials"),
         ("forgets the first", "one trial more"),
         pytest.param("weighs by the order", "order", marks=pytest.mark.slow),
@@ -176,6 +186,11 @@ def listed(_posterior: object, isi_ms: Array) -> Any:
     return [[0.0] * len(isi_ms)]
 
 
+def written_into(_posterior: object, isi_ms: Array) -> Array:
+    isi_ms *= 0.0
+    return isi_ms
+
+
 @dataclass(frozen=True)
 class Scoring:
     """An acquisition function of a plain function."""
@@ -195,6 +210,8 @@ class Scoring:
         (cast("Any", Scoring), "is no class"),
         (Scoring(undecided), "finite"),
         (Scoring(moody), "same scores"),
+        (Scoring(written_into), "ISIs are left"),
+        (Scoring(lambda _posterior, isi_ms: isi_ms.astype(str)), "numbers"),
         (Scoring(listed), "NumPy array"),
         (Scoring(flat, needs=(ProposesIsi,)), "not ProposesIsi"),
         (flat, "says what it needs"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -18,11 +18,17 @@ class Part:
     name: str
 
 
+class Law(NamedTuple):
+    median: float = 1.0
+    sd: float = 1.0
+
+
 @dataclass(frozen=True)
 class Whole:
     parts: tuple[Part, ...]
     people: int = 3
     extra: Part | None = None
+    law: Law | None = None
 
 
 def test_values_become_the_dataclass() -> None:
@@ -35,6 +41,7 @@ def test_values_become_the_dataclass() -> None:
         ({"parts": [], "peple": 3}, r"f.toml: the key peple is unknown; got 3; .*Did you mean people"),
         ({"parts": [{"nam": "a"}]}, r"the key parts.0.nam is unknown.*Did you mean name"),
         ({"parts": [], "extra": {"nam": "a"}}, r"the key extra.nam is unknown.*Did you mean name"),
+        ({"parts": [], "law": {"medan": 2.0}}, r"the key law.medan is unknown.*one of median, sd.*Did you mean median"),
         ({"parts": [], "people": "many"}, r"the value of people cannot be used; got 'many'; expected a whole number"),
         ({"parts": "ab"}, r"the value of parts cannot be used; got 'ab'; expected a list"),
         ({"parts": [7]}, r"the value of parts.0 cannot be used; got 7; expected a table of keys and values"),

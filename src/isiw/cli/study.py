@@ -23,6 +23,7 @@ from isiw.cli.console import (
     counting,
     errors_reported,
     exit_if_damaged,
+    refuse_ignored,
     show,
     ticking,
     working,
@@ -139,6 +140,7 @@ Folder = Annotated[Path, typer.Argument(help="The folder of a study.")]
 
 @study.command()
 def run(
+    context: typer.Context,
     source: Annotated[
         Path, typer.Argument(help="A study (TOML), or the folder of one, to continue it, or with --out to begin again.")
     ],
@@ -151,6 +153,8 @@ def run(
 ) -> None:
     """Run a study, or what is left of it. The exit code is 1 if sessions failed."""
     with errors_reported():
+        if scheduler:
+            refuse_ignored("the workers of a Dask cluster are those that it has", context, "workers")
         with working(f"Running the study of {source}"):
             studies, store = isiw.studies, _store(source, out)
             left = store.left(retry=retry)
@@ -169,6 +173,7 @@ def run(
 
 @study.command()
 def replay(
+    context: typer.Context,
     folder: Folder,
     key: Annotated[str, typer.Argument(help="A unit's key, or the number of a row of the table.")],
     person: Annotated[int | None, typer.Option(help="Of a batch, compare this person only.")] = None,
@@ -181,6 +186,7 @@ def replay(
         with working(f"Opening {folder}"):
             store = isiw.studies.open_store(folder) if study is None else _store(study, folder)
         if (row := read_whole(key)) is not None:
+            refuse_ignored("a row of the table is of one person", context, "person")
             key, person = isiw.studies.running.unit_of_row(store, row)
         with working(f"Running {key} again"):
             result = isiw.studies.replay(store, key, person)

@@ -80,6 +80,9 @@ class _Call(Generic[_T]):
         while not self.ended and (left_s := self._began_s + deadline_s - time.monotonic()) > 0 and not given_up():
             self._ended.wait(min(left_s, _GLANCE_S))
 
+    def failed_with(self, error: Exception) -> bool:
+        return self._error is error
+
     def result(self) -> _T:
         if self._error is not None:
             raise self._error
@@ -184,7 +187,12 @@ class PunctualDevice:
             require_staged(self._name, staged=not self._stopped)
             call = self._begun(partial(self._device.deliver, stimulus, timeout_s))
         self._late = call
-        return self._awaited("deliver", call, timeout_s, self._given_up)
+        try:
+            return self._awaited("deliver", call, timeout_s, self._given_up)
+        except Exception as error:
+            if call.failed_with(error):  # in time, and whoever waits is told
+                self._late = None
+            raise
 
     def late_answer(self, wait_s: float) -> Answer | None:
         """The answer to the last delivery that came after its deadline; None if none did."""

@@ -46,7 +46,8 @@ _SESSION_COLUMNS: Final[Columns] = {
     "age_years": ("year", "the person's age, if noted"),
     "height_cm": ("cm", "the person's height, if noted"),
     "tap_n": ("N", "peak force of the tap, if noted"),
-    "delivered": ("", "stimuli that were given, or may have been"),
+    "given_before": ("", "stimuli before them that count for the limits, such as pulses over the recruitment curve"),
+    "delivered": ("", "stimuli that were given in the session, or may have been"),
     "told": ("", "trials that the strategy learnt from"),
     "mistrials": ("", "trials that were judged to be mistrials"),
     "p_window": ("", "probability that there is a window, at the end; empty, as the result, after too few trials"),
@@ -166,6 +167,7 @@ def _what_it_is(record: SessionRecord) -> dict[str, Any]:
 
 def _what_came_of_it(record: SessionRecord) -> dict[str, Any]:
     counts = {
+        "given_before": record.header.given_before,
         "delivered": record.given,
         "told": len(record.table.told),
         "mistrials": sum(trial.reason is not None for trial in record.table),

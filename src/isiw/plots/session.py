@@ -45,6 +45,7 @@ _EDGE, _ALONE = 0.02, 0.06
 _STYLES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "trial": {"marker": "o", "ms": 4.5, "color": INK, "mec": "white", "mew": 0.5},
+        "trial at another intensity": {"marker": "^", "ms": 5, "color": FAINT, "mec": "white", "mew": 0.5},
         "excluded": {"marker": "o", "ms": 4.5, "mfc": "none", "mec": FAINT},
         "mistrial": {"marker": "x", "ms": 5, "color": RED},
     }
@@ -131,9 +132,7 @@ def _draw_trials(axes: Axes, record: SessionRecord) -> None:
     """Where they happened; at the lower edge where no MEP was measured, at the ISI asked where none was realised."""
     alone_ms = _alone_ms(record)
     for kind, style in _STYLES.items():
-        of_kind = [
-            t for t in record.table if kind == ("mistrial" if t.reason else "excluded" if t.excluded else "trial")
-        ]
+        of_kind = [trial for trial in record.table if _kind(trial) == kind]
         trials = [(trial, ms) for trial in of_kind if (ms := _place_ms(trial, alone_ms)) is not None]
         seen = [(place_ms, trial.mep_mv) for trial, place_ms in trials if trial.mep_mv is not None]
         if seen:
@@ -143,6 +142,13 @@ def _draw_trials(axes: Axes, record: SessionRecord) -> None:
         if lost:
             axes.plot(lost, [0.02] * len(lost), label=None if seen else kind, zorder=3, ls="",
                       transform=axes.get_xaxis_transform(), **style)  # fmt: skip
+
+
+def _kind(trial: Trial) -> str:
+    """Of the styles; the profile is that at the usual intensity, which pulses at others need not fit."""
+    if trial.reason is not None or trial.excluded:
+        return "mistrial" if trial.reason is not None else "excluded"
+    return "trial" if trial.intensity_pct_rmt is None else "trial at another intensity"
 
 
 def _place_ms(trial: Trial, alone_ms: float) -> float | None:

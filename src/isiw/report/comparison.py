@@ -65,7 +65,9 @@ def _cell(estimate: Estimate, edge: Edge) -> str:
 
 def comparison_sentence(difference: Difference) -> str:
     """A sentence on the difference of two windows."""
-    kind = "the same person" if difference.same_person else "different subject codes"
+    named = difference.first.header.subject and difference.second.header.subject
+    other = "different subject codes" if named else "perhaps the same person, as not both have a subject code"
+    kind = "the same person" if difference.same_person else other
     said = [
         f"{_whose(difference.second)} against {_whose(difference.first)}, {kind}:",
         sentences.moved(difference.moved, 1.0 - DayToDay().p_stays),

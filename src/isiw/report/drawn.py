@@ -58,16 +58,17 @@ def drawn(record: SessionRecord) -> dict[str, Any]:
 def _dotted(record: SessionRecord) -> str:
     """The meaning of the dotted lines in a sweep, in a sentence."""
     first = record.header.stimulus
-    if first.by_valve or any(trial.t_valve_ms is not None for trial in record.table):
+    if any(trial.t_valve_ms is not None for trial in record.table):
         return f"Dotted orange lines: valve command and {first.mark}."
     return f"Dotted orange line: {first.mark}."
 
 
 def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
     row = trial_row(trial, record.header.stimulus)
+    counts = "counts" if trial.intensity_pct_rmt is None else "other"  # the profile is that at the usual intensity
     return {
         "number": trial.index,
-        "kind": "mistrial" if trial.reason is not None else "excluded" if trial.excluded else "counts",
+        "kind": "mistrial" if trial.reason is not None else "excluded" if trial.excluded else counts,
         "isAlone": trial.is_control and not trial.tap_alone and trial.isi_ms is None,
         "asked": row.asked,
         "realised": row.realised,

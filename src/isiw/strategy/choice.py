@@ -50,7 +50,7 @@ class Choice:
 
 @cache
 def candidate_isis(space: DesignSpace) -> Singles:
-    """Evenly spaced ISIs to score [ms], both ends included, shape (t,); one array for all, who leave it as it is."""
+    """Evenly spaced ISIs to score [ms], both ends included, shape (t,); one array for all, so that nobody may write."""
     grid = space.grid_ms
     stride = max(1, math.ceil((len(grid) - 1) / (MAX_CANDIDATES - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
@@ -68,7 +68,7 @@ def best_choices(
 ) -> tuple[Choice, ...]:
     """The ISI of each person that the acquisition function scores best; an evenly spaced one if it scores none."""
     candidates = candidate_isis(space)
-    given = require_scores(acquisition, acquisition(posterior, candidates), len(candidates), people)
+    given = require_scores(acquisition, acquisition(posterior, candidates.copy()), len(candidates), people)
     scores = np.broadcast_to(given, (people, len(candidates)))
     net = scores if cost is None else scores - cost(candidates)
     best = best_candidate(net, first=golden_index(told, len(candidates)))

@@ -167,13 +167,21 @@ def _after(model: ResponseModel, space: DesignSpace, trials: Trials, people: int
 
 
 def _check_learning(model: ResponseModel, space: DesignSpace, trials: Trials) -> None:
-    before = model.begin(space, 1)
-    require(isinstance(before, Posterior), "a posterior has trials and estimate()")
-    require(before.trials == 0, "a prior has learnt from no trials")
-    estimate = before.estimate()
-    after = model.update(before, _observation(*trials[0]))
-    require(after.trials == 1 and before.trials == 0, "update makes a posterior that has learnt from one trial more")
-    require(same_estimates(before.estimate(), estimate), "a posterior never changes")
+    posterior = model.begin(space, 1)
+    require(isinstance(posterior, Posterior), "a posterior has trials and estimate()", shown(posterior))
+    require(posterior.trials == 0, "a prior has learnt from no trials")
+    for told, trial in enumerate(trials[:2]):  # many write into the posterior from the second trial on
+        estimate, observation = posterior.estimate(), _observation(*trial)
+        check_estimate(estimate, space, f"after {counted(told, 'trial')}")
+        after = model.update(posterior, observation)
+        require(isinstance(after, Posterior), "update makes a posterior", shown(after))
+        require(
+            (after.trials, posterior.trials) == (told + 1, told), "update makes one that has learnt from one trial more"
+        )
+        require(same_estimates(posterior.estimate(), estimate), "a posterior never changes")
+        left = np.array_equal([observation.isi_ms, observation.mep_mv], np.array(trial, dtype=np.float32)[:, None])
+        require(left, "update leaves the observation as it is")
+        posterior = after
 
 
 def _check_order(model: ResponseModel, space: DesignSpace, trials: Trials, tolerance_ms: float) -> None:
@@ -366,12 +374,15 @@ def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, sp
     before = posterior.estimate()
     for count in (1, 2, 23):
         isi_ms = np.linspace(space.low_ms, space.high_ms, count, dtype=np.float32)
+        kept_ms = isi_ms.copy()
         scores = _array("scores", acquisition(posterior, isi_ms))
+        require(np.array_equal(isi_ms, kept_ms), "the ISIs are left as they are", str(isi_ms.tolist()))
         people = people_of(posterior, isi_ms)
         alike = scores.shape in {(count,), (1, count)}  # for all people
         shaped = alike or (scores.ndim == 2 and scores.shape == (people or len(scores), count))
         of = "" if people is None else f" of {counted(people, 'person', 'people')}"
         require(shaped, "scores have the shape (t,) or (b, t)", f"{scores.shape} for {counted(count, 'ISI')}{of}")
+        require(scores.dtype.kind in "biuf", "scores are numbers", str(scores.dtype))
         require(bool(np.isfinite(scores).all()), "scores are finite", str(scores.tolist()))
         require(np.array_equal(scores, acquisition(posterior, isi_ms)), "the same posterior gives the same scores")
     require(same_estimates(posterior.estimate(), before), "scoring leaves the posterior as it was")

@@ -62,7 +62,9 @@ def known_keys(kind: Any, section: Sequence[int | str]) -> list[str]:
         kind = get_args(kind)[0] if isinstance(name, int) else get_type_hints(kind)[name]
         if isinstance(kind, UnionType):  # a section that may be left out
             kind = next(each for each in get_args(kind) if each is not NoneType)
-    return sorted(f.name for f in fields(kind)) if is_dataclass(kind) else sorted(kind.model_fields)
+    if is_dataclass(kind):
+        return sorted(field.name for field in fields(kind))
+    return sorted(kind.model_fields if hasattr(kind, "model_fields") else kind._fields)  # else a named tuple
 
 
 _T = TypeVar("_T")

@@ -14,6 +14,7 @@ FAULT = {
     "do": "See that the stimulator is disarmed. Then resume with: isiw resume isiw-sessions/P07.mcap session.toml",
     "what": "the device does not answer: USB device vanished. The pulse of trial 7 may have been given, and counts.",
 }
+UNPROTECTED = "My rig is not protected if isiw dies: what is armed then stays armed. Keep the switch at hand."
 REASON = "3 mistrials in a row: no impact. Is the hammer free, and the accelerometer plugged in?"
 
 
@@ -27,6 +28,7 @@ def in_state(news: dict[str, Any], state: State) -> dict[str, Any]:
         "pause": {"number": 1, "reason": REASON} if state is State.PAUSED else None,
         "fault": FAULT if state is State.FAULT else None,
         "waitS": {State.RUNS: 4.0, State.REST: 72.0}.get(state),
+        "unprotected": UNPROTECTED,
         "backgroundUv": 3.1,
         "limitUv": 20.0,
         "coilC": 31.5,

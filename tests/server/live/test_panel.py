@@ -22,7 +22,7 @@ from isiw.errors import InvalidValueError
 from isiw.session.pausing import Presses
 from isiw.session.rig import Rig
 from isiw.session.state import SENTENCES, State
-from server.live.staged import FAULT, REASON, Staged, in_state
+from server.live.staged import FAULT, REASON, UNPROTECTED, Staged, in_state
 from server.live.watched import Watched
 
 pytestmark = [pytest.mark.slow, IN_CHROMIUM]
@@ -232,7 +232,8 @@ def test_the_words_of_the_page_are_those_of_the_table(browser: Any, stage: Stage
     page = opened(browser, stage)
     for state in (State.RUNS, State.REST, State.ENDED):
         turned(page, stage, state)
-        assert page.inner_text("#line") == SENTENCES[state]
+        warned = f" {UNPROTECTED}" if stage.news["armed"] else ""
+        assert page.inner_text("#line") == SENTENCES[state] + warned
     page.close()
 
 

@@ -328,7 +328,7 @@ class GaussianProcessPosterior(OfAmplitudes):
 
     def baselines_mv(self) -> Singles:
         """Sampled floors; see `SamplesProfiles`. They are 0 unless the floor is `"subtracted"`."""
-        return self._sample.floor_mv.numpy()
+        return self._sample.floor_mv.numpy().copy()
 
     def condition(self, isi_ms: Array, mep_mv: Array) -> GaussianProcessPosterior:
         """The posterior after one more trial, with the same hyperparameters; see `Conditions`."""

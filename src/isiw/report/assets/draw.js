@@ -1,7 +1,7 @@
 "use strict";
 // What the pages of a session draw with plotly: a belief with the trials, and a sweep. Sessions are as `isiw.report.drawn` gives them.
 const draw = (() => {
-  const names = { counts: "trial", excluded: "excluded", mistrial: "mistrial" };
+  const names = { counts: "trial", other: "trial at another intensity", excluded: "excluded", mistrial: "mistrial" };
   const options = { displayModeBar: false, responsive: true }; // plotly's own buttons would upload what is drawn
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const axis = (title, more = {}) => ({
@@ -49,7 +49,7 @@ const draw = (() => {
   const [roomShare, aloneShare] = [0.02, 0.06];
   function placesMs(session) {
     const [low, high] = session.range;
-    const isis = session.trials.filter((trial) => trial.kind === "counts" && trial.isiMs !== null).map((trial) => trial.isiMs);
+    const isis = session.trials.filter((trial) => ["counts", "other"].includes(trial.kind) && trial.isiMs !== null).map((trial) => trial.isiMs);
     const [least, most] = isis.reduce(([min, max], isi) => [Math.min(min, isi), Math.max(max, isi)], [low, high]);
     const room = roomShare * (high - low);
     if (!session.trials.some((trial) => trial.isAlone)) return { aloneMs: null, range: [least - room, most + room] };
@@ -63,7 +63,7 @@ const draw = (() => {
   const heightUv = (trial, lowestUv) => measuredUv(trial, lowestUv) ?? (trial.kind === "mistrial" ? lowestUv : null);
 
   function trialTrace(trials, kind, number, lowestUv, places) {
-    const symbol = { counts: "circle", excluded: "circle-open", mistrial: "x-thin-open" }[kind];
+    const symbol = { counts: "circle", other: "triangle-up", excluded: "circle-open", mistrial: "x-thin-open" }[kind];
     const shown = trials.filter((trial) => trial.kind === kind && placeMs(trial, places) !== null && heightUv(trial, lowestUv) !== null);
     return {
       x: shown.map((trial) => placeMs(trial, places)), y: shown.map((trial) => heightUv(trial, lowestUv)),
@@ -71,7 +71,7 @@ const draw = (() => {
       customdata: shown.map((trial) => trial.number), name: names[kind], mode: "markers", type: "scatter", cliponaxis: false,
       marker: {
         symbol, size: shown.map((trial) => (trial.number === number ? 14 : 8)),
-        color: colour(kind === "mistrial" ? "red" : "ink"),
+        color: colour({ mistrial: "red", other: "faint" }[kind] ?? "ink"),
         opacity: shown.map((trial) => (trial.number > number ? 0.18 : 1)),
         line: { width: kind === "mistrial" ? 2 : 1, color: colour(kind === "mistrial" ? "red" : "ink") },
       },

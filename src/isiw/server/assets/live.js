@@ -25,7 +25,7 @@
     said("line", bar.line);
     said("more", bar.more);
     element("lamp").dataset.armed = bar.armed ?? "";
-    said("lamp", bar.armed === null ? "armed: not known" : bar.armed ? (news?.unprotected ? `ARMED: ${news.unprotected}` : "ARMED") : "not armed");
+    said("lamp", bar.armed === null ? "armed: not known" : bar.armed ? "ARMED" : "not armed");
     for (const [id, works] of Object.entries(buttons)) element(id).setAttribute("aria-disabled", String(!works));
     element("log").setAttribute("aria-disabled", String(!buttons.note));
     document.body.classList.toggle("stale", bar.state === "NO CONNECTION");

@@ -17,7 +17,8 @@ const panel = (() => {
     if (!news.over && !connected) {
       return { state: "NO CONNECTION", count: "", line: lost, more: "What is shown below is old, and the buttons do nothing.", armed: null };
     }
-    const { state, sentence, pause, fault, waitS, armed } = news;
+    const { state, pause, fault, waitS, armed } = news;
+    const sentence = armed && news.unprotected ? `${news.sentence} ${news.unprotected}` : news.sentence;
     const left = waitS === null ? null : waitS - ageMs / 1000;
     if (state === "FAULT") return { state, count: "", line: fault.do, more: fault.what, armed };
     if (state === "PAUSED") return { state, count: "", line: pause.reason, more: "", armed };

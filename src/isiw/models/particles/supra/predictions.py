@@ -27,7 +27,7 @@ class SupraSample(TabledSample):
 
     def baselines_mv(self) -> Singles:
         """Expected MEP without a tap [mV], shape (b, s)."""
-        return self._baseline_mv[..., 0]
+        return self._baseline_mv[..., 0].copy()
 
     @cached_property
     def _extremes_mv(self) -> tuple[Singles, Singles]:
