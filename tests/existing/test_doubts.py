@@ -153,7 +153,7 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "outliers that nothing is read of": (table(outlier_3sd=of([0, 0, 0, 1])), {}, '--column "exclude=outlier_3sd"; if'),
     "trials that were used": (table(used=of(["x", "x", "x", ""])), {}, '--column "status=used"; if'),
     "a status that is left empty": (table(valid=of(["yes", "yes", ""])), {}, "is empty, and others say yes"),
-    "ISIs below 0": (table().assign(isi_ms=np.where(ISIS > 20, -ISIS, 20)), {}, "has most ISIs below 0.*got '32 of 36'"),
+    "ISIs below 0": (table().assign(isi_ms=np.where(ISIS > 20, -ISIS, 20)), {}, "most ISIs below 0.*got '32 of 36'"),
     "numbers of rows out of order": (table().sort_values("isi_ms").reset_index(names=""), {}, "column 'index'"),
     "blocks with the newest row first": (table(trial=range(36), block=of([1])).iloc[::-1], {}, "its column 'trial'"),
     "a recruitment curve beside pairs": (table(mso=of([55])).assign(isi_ms=np.where(ISIS > 40, ISIS, np.nan),
@@ -262,12 +262,6 @@ def test_the_maximum_minus_the_minimum_is_an_amplitude_from_peak_to_peak(name: s
     assert len(person.trials.told) == 36
 
 
-def test_numbers_of_trials_that_do_not_count_are_asked_about(tmp_path: Path) -> None:
-    scipy.io.savemat(tmp_path / "P01.mat", {"isi_ms": ISIS, "mep_mv": table()["mep_mv"], "badTrials": [3, 7]})
-    with pytest.raises(IsiwError, match=r"'badTrials' is not as long as that of the ISIs.*got '?\[3, 7\]"):
-        read_people(tmp_path / "P01.mat", IMPACT)
-
-
 @pytest.mark.parametrize(
     "beside",
     [
@@ -343,15 +337,6 @@ def test_a_pulse_just_before_the_tap_is_a_mistrial_in_a_recording_as_in_a_table(
     for one in (person, other):
         assert str(one.trials[0].reason) == "TMS before impact"
         assert one.trials[0].isi_ms == pytest.approx(-2.0)
-
-
-@pytest.mark.parametrize("later_s", [0.0005, 0.0019])
-def test_a_trigger_of_the_tap_that_is_found_twice_is_one(later_s: float) -> None:
-    twice = with_events(
-        lambda rows: sorted([*rows, *((at + later_s, name) for at, name in rows if name == NAMES["tap"])])
-    )
-    (person,) = read_people(twice, KNOWN)
-    require_as_written(person)
 
 
 def test_an_annotation_of_bad_data_leaves_the_events_of_a_stim_channel(tmp_path: Path) -> None:
@@ -492,13 +477,6 @@ def test_a_trigger_whose_level_turns_at_each_stimulus_is_asked_about() -> None:
     turns = 5.0 * (np.cumsum(pulsed(1, NAMES["pulse"], 1.0)) % 2)
     with pytest.raises(IsiwError, match="which of its edges are stimuli"):
         read_people(with_stim(turns, "emg"), Layout(reference="impact", channels={"emg": "FCR", "pulse": "STI"}))
-
-
-def test_a_wave_in_the_place_of_a_trigger_is_asked_about() -> None:
-    force = np.convolve(pulsed(1, NAMES["tap"], 1.0), np.hanning(80))[: len(EMG_MV)]
-    force *= np.linspace(1, 5, len(force))
-    with pytest.raises(IsiwError, match="'STI' has more than two levels, as a wave of force or acceleration"):
-        read_people(with_stim(force, "emg"), Layout(reference="impact", channels={"emg": "FCR", "tap": "STI"}))
 
 
 @pytest.mark.parametrize("change", [np.abs, lambda emg: np.abs(emg) - 0.02, lambda emg: -np.abs(emg)])

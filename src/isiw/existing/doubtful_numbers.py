@@ -32,14 +32,14 @@ _WITH, _ITS_HALF, _EXACT = 0.8, 0.7, 0.02  # halves correlate so with amplitudes
 _FEW, _FEWEST = 3, 12  # in a table with fewer rows ISIs may come again by chance
 _LONG_BEFORE_MS: Final = 50.0  # no pulse is given so long before the tap
 _NO_MEP: Final = {"none", "n.d.", "k.a.", "-", "--", "–", "—", ".", "?"}  # in an amplitude's place
-_LOGS, _LOG_CV = (1.0, 12.0), 0.3  # logarithms of µV are among these, and scatter so little
+_LOGS, _LOG_CV = ((1.0, 12.0), (25.0, 90.0)), 0.3  # logarithms of µV are among these, or in dB, and scatter so little
 _NEAR_MS, _ALIKE = (1.0, 25.0), 0.98  # so far from each other are ISIs that were asked and measured, and so alike
 
 
 def require_plain_numbers(columns: Columns) -> None:
     """Raise if the numbers of ISIs and amplitudes seem to be something else, in two units, or of each row twice."""
-    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each, _require_absolute, _require_uncut,
-                  _require_whole):  # fmt: skip
+    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each, _require_whole, _require_absolute,
+                  _require_uncut):  # fmt: skip
         doubt(columns)
 
 
@@ -68,8 +68,9 @@ def _require_isis(columns: Columns) -> None:
         apart = odd <= 0 or odd > 2 * max(others)
         strange = odd in {-1, -9, 99, 999} or odd > max(499.0, 2 * max(others))
         strange |= odd < -_LONG_BEFORE_MS and len({*before}) == 1
-        strange |= apart and (times[odd] >= 2 * max(others.values()) or _is_named(columns, odd))
-        strange |= times[odd] >= 2 * _FEW and max(others.values()) < _FEW and len(others) >= _FEWEST
+        usual = max(others.values())
+        strange |= apart and (times[odd] >= min(2 * usual, max(1.5 * usual, usual + _FEW)) or _is_named(columns, odd))
+        strange |= times[odd] >= 2 * _FEW > 2 * usual and len(others) >= _FEWEST
         if strange:
             what = f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone"
             remedy = f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never."
@@ -133,7 +134,9 @@ def _require_one_unit(columns: Columns) -> None:
     if said:
         remedy = f"{mep.remedy} If all such trials are lost"
         mep.doubt("may say that there was no MEP, or that it is not known", None, remedy, row=said[0])
-    if len(coded) >= _FEW and len({mep.text(row) for row in coded}) == 1:
+    others = [number for row in {*columns.rows} - {*coded} if (number := mep.number(row)) is not None]
+    are_apart = bool(coded) and (mep.number(coded[0]) or 0.0) > 2 * max(others, default=np.inf)
+    if (len(coded) >= _FEW or are_apart) and len({mep.text(row) for row in coded}) == 1:
         remedy = "If it does, leave these cells empty; if not"
         mep.doubt("may stand for no amplitude", None, remedy, row=coded[0])
     for key, (least, most) in _POSSIBLE.items():
@@ -164,8 +167,8 @@ def _require_absolute(columns: Columns) -> None:
     odd["mean"] = float(of_all.mean()), step / len(rows) ** 0.5, _FINE
     odd["largest"] = float(of_all.max()), step, _FINE
     remedy = "Name the column of the amplitudes themselves: --column mep=NAME; if these are"
-    are_logs = _LOGS[0] < of_all.min() < of_all.max() < _LOGS[1] and of_all.std() < _LOG_CV * of_all.mean()
-    if are_logs and len(rows) >= _FEWEST:
+    are_logs = any(least < of_all.min() < of_all.max() < most for least, most in _LOGS)
+    if are_logs and of_all.std() < _LOG_CV * of_all.mean() and len(rows) >= _FEWEST:
         mep.doubt("scatters as little as logarithms do", f"{of_all.min():g} to {of_all.max():g}", remedy)
     for (what, (number, rounded, most)), one in product(odd.items(), (1.0, 100.0)):
         if rounded <= most * one and abs(number - one) <= max(rounded if "mean" in what else 0.0, 1e-9 * one):

@@ -32,6 +32,7 @@ _FEW, _BELOW_AT_MOST, _BELOW = 3, 20, 50  # so many rows at most are below the t
 _SEVERAL: Final = 12  # in a table with fewer rows most may be left out
 _CODE: Final = 4  # a shorter text in rows that follow may be initials
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
+_ALONE_AT_MOST: Final = 2  # so few rows without an ISI are no baseline that was measured after all pairs
 _ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
 _LAST: Final = 2000  # so many rows at most are compared with those below them
@@ -98,11 +99,11 @@ def require_no_summaries(columns: Columns, apart: int | None) -> None:
             chance *= _CHANCE ** (int(below == begin) + int(finer))
             if are_so[begin] and 2 * are_so[begin:].sum() > len(known) - begin and chance < _CHANCE:
                 raise mep.refused(known[begin], _IS_FIGURE, _BELOW_TRIALS)
-    unnumbered = [n for n, row in enumerate(known) if not order.text(row) and "order" in columns.of]
-    are_last = bool(unnumbered) and len(known) - unnumbered[0] == len(unnumbered) <= _BELOW_AT_MOST
-    if are_last and not np.isfinite(isis[unnumbered]).any():
-        why = f"has no ISI, and no number in the column {order.name!r}, as a mean or a sum has"
-        raise mep.refused(known[unnumbered[0]], why, _BELOW_TRIALS)
+    said, most = (order, _BELOW_AT_MOST) if "order" in columns.of else (isi, _ALONE_AT_MOST * (len(known) > _SEVERAL))
+    bare = [n for n, row in enumerate(known) if not said.text(row) and columns.called_alone(row) is None]
+    if bare and len(known) - bare[0] == len(bare) <= most and not np.isfinite(isis[bare]).any():
+        numbered = f", and no number in the column {order.name!r}," if said is order else ", and all above have one,"
+        raise mep.refused(known[bare[0]], f"has no ISI{numbered} as a mean or a sum has", _BELOW_TRIALS)
     ends = [-1, *np.flatnonzero(digits == digits.max(initial=0))]
     between = [_figures(meps[begin + 1 : end])[:_USUAL] for begin, end in pairwise(ends)]  # each of its own trials
     if 1 < len(ends) <= len(known) / _ROWS_A_PART and all(

@@ -36,7 +36,7 @@ RELATIVE: Final = (
     r"\bmep\b.*\bmep\b|\bindex\b(?! ?finger)"
 )
 WHOLE: Final = r"peak\W*(to|2)?\W*peak|\bp\W?(2|to|t)?\W?p\b|max\w*\W+(to\W+)?min"  # from peak to peak
-_HALVES: Final = r"\b(bas[ei]|zero|0|onset|null)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b"
+_HALVES: Final = r"\b(bas[ei]|zero|0|onset|null|neg|pos)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b"
 _MEASURES: Final = (
     rf"{_HALVES}|\b[aá]rea\b|\baire\b|fläche|\bauc\b|\brms\d*\b|tkeo|teager|\babs\b|\benv\b|integra|\biemg\b|rectif|\brect\b(?!\W*(fem|abd))|gleichger|"
     r"\b(envelope|arv|mav|turns|power|energy|snr|counts|adc|adu|lsb)\b|"
