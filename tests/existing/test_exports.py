@@ -265,19 +265,6 @@ def test_the_first_question_about_a_wrong_unit_in_a_name_has_the_whole_way_out(
     assert len(trials_of(read_people(made, said))) == 48
 
 
-def test_excel_may_show_a_part_of_a_number_and_notes_leave_out(tmp_path: Path) -> None:
-    for n, (shown, note) in enumerate((("0.000,", ""), ("General", "EK:\ncoil moved, repeat"))):
-        with pd.ExcelWriter(tmp_path / f"P{n}.xlsx", engine="openpyxl") as book:
-            table()[~ALONE].to_excel(book, index=False)
-            for cells in book.book.active.iter_rows(min_row=2, min_col=2):
-                cells[0].number_format = shown
-            if note:
-                book.book.active["B8"].comment = openpyxl.comments.Comment(note, "EK")
-    for n, says in enumerate((r"'MEP \(mV\) \(÷1000\)' are multiplied", "row of .* with a note, .*; got 'row 8'")):
-        with pytest.raises(IsiwError, match=says):
-            read_people(tmp_path / f"P{n}.xlsx", IMPACT)
-
-
 @pytest.mark.parametrize(
     ("more", "says"),
     [({"badTrials": 7}, "'badTrials' is not as long"), ({"badsweeps": [3, 9]}, r"'badsweeps' is not .* got '?\[3, 9\]"),

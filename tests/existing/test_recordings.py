@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import isiw
-from existing.writers import ISIS_MS, KNOWN, NAMES, as_brainvision, as_edf, epochs, raw, require_as_written, with_stim
+from existing.writers import ISIS_MS, KNOWN, NAMES, as_brainvision, as_edf, epochs, raw, require_as_written
 from isiw.errors import IsiwError
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
@@ -38,12 +38,6 @@ def test_a_recording_that_was_cropped_is_read_as_the_whole_one(date: int | None,
     for source in (made, tmp_path / "P01_raw.fif.gz"):
         (person,) = read_people(source, KNOWN)
         require_as_written(person)
-
-
-def test_a_trigger_channel_has_events_too() -> None:
-    made = with_stim()
-    (person,) = read_people(made, Layout(reference="impact", markers={"tap": "1", "pulse": "2"}, unmarked="alone"))
-    require_as_written(person)
 
 
 def test_the_metadata_of_epochs_say_units_and_tms_alone() -> None:

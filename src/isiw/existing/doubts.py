@@ -104,12 +104,12 @@ def require_no_summaries(columns: Columns, apart: int | None) -> None:
     if bare and len(known) - bare[0] == len(bare) <= most and not np.isfinite(isis[bare]).any():
         numbered = f", and no number in the column {order.name!r}," if said is order else ", and all above have one,"
         raise mep.refused(known[bare[0]], f"has no ISI{numbered} as a mean or a sum has", _BELOW_TRIALS)
-    ends = [-1, *np.flatnonzero(digits == digits.max(initial=0))]
-    between = [_figures(meps[begin + 1 : end])[:_USUAL] for begin, end in pairwise(ends)]  # each of its own trials
-    if 1 < len(ends) <= len(known) / _ROWS_A_PART and all(
-        (abs(figures - meps[end]) <= slacks[end]).any() for figures, end in zip(between, ends[1:], strict=True)
-    ):
-        raise mep.refused(known[ends[1]], _IS_FIGURE, _BELOW_TRIALS)
+    for least, are_ends in ((1, digits == digits.max(initial=0)), (2, np.isnan(isis))):  # each of its own trials
+        spans = [*pairwise([-1, *np.flatnonzero(are_ends)])]
+        parts = ((_figures(meps[begin + 1 : end])[:_USUAL], end) for begin, end in spans)
+        agree = [(abs(figures - meps[end]) <= slacks[end]).any() for figures, end in parts]
+        if least <= len(spans) < len(known) / _ROWS_A_PART and np.mean(agree) > _SHARED:
+            raise mep.refused(known[spans[0][1]], _IS_FIGURE, _BELOW_TRIALS)
 
 
 def _figures_of(meps: FloatArray, isis: FloatArray) -> Iterator[FloatArray]:
@@ -227,6 +227,12 @@ def _require_said(columns: Columns) -> None:
         if (by := columns.called_alone(row)) is not None and not (by is condition and one_word):
             remedy = "If it is TMS alone, leave its ISI empty, or say --alone with it; if a pair, rename the column."
             raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
+    once = [number for row in paired if (number := isi.number(row)) is not None]
+    if 2 * len(once) <= len(columns.rows) and len(once) > _FEW and once == sorted({*once}):  # as in the first row alone
+        remedy = "Write each row's own; if they are TMS alone, write that there, or number all in a column called trial."
+        bare = next((row for row in columns.rows if not isi.text(row) and "order" not in columns.of), None)
+        if bare is not None and columns.called_alone(bare) is None:
+            raise isi.refused(bare, "is empty, as if the ISI above held for it, too", remedy)
     of_alone = {isi.text(row) for row in {*columns.rows} - {*paired}} - {""}
     unsaid = [row for row in paired if not condition.text(row) and isi.text(row) in of_alone]
     if unsaid and condition.name:  # such as a word that stands in the first row of each block alone
