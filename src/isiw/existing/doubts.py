@@ -229,7 +229,7 @@ def _require_said(columns: Columns) -> None:
             raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
     once = [number for row in paired if (number := isi.number(row)) is not None]
     if 2 * len(once) <= len(columns.rows) and len(once) > _FEW and once == sorted({*once}):  # as in the first row alone
-        remedy = "Write each row's own; if they are TMS alone, write that there, or number all in a column called trial."
+        remedy = "Write each row's own; if it is TMS alone, write that there, or number all in a column called trial."
         bare = next((row for row in columns.rows if not isi.text(row) and "order" not in columns.of), None)
         if bare is not None and columns.called_alone(bare) is None:
             raise isi.refused(bare, "is empty, as if the ISI above held for it, too", remedy)
