@@ -123,9 +123,7 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
         return [one._replace(log=Path(output)) for one in people]
     if Path(output).suffix and not Path(output).is_dir():
         what = "the output is neither a log nor a folder"
-        remedy = (
-            "Name a log (.mcap), or a folder for a log of each person; first make one with a full stop in its name."
-        )
+        remedy = "Name a log (.mcap), or a folder for a log of each person; make it first if its name has a full stop."
         raise InvalidValueError(what, got=str(output), remedy=remedy)
     days = [f"_day{day}" if (day := one.delivered.visit.day) else "" for one in people]
     stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]

@@ -236,9 +236,7 @@ def _require_said(columns: Columns) -> None:
     of_alone = {isi.text(row) for row in {*columns.rows} - {*paired}} - {""}
     unsaid = [row for row in paired if not condition.text(row) and isi.text(row) in of_alone]
     if unsaid and condition.name:  # such as a word that stands in the first row of each block alone
-        remedy = (
-            f"Write into each row what it is; if all with that ISI are TMS alone, say --alone {isi.text(unsaid[0])}."
-        )
+        remedy = f"Write into each row what it is; if all with it are TMS alone, say --alone {isi.text(unsaid[0])}."
         raise condition.refused(unsaid[0], "is empty, and the ISI there is that of TMS alone", remedy)
     flags, lost = columns[columns.flags], sum(columns.lost(row) is not None for row in columns.rows)
     if len(columns.rows) >= _SEVERAL and 2 * lost > len(columns.rows):
@@ -306,9 +304,8 @@ def _seldom_states(by_isi: Sequence[tuple[float, int]], column: Column) -> list[
     said = np.array(texts) == min(times, key=lambda text: times[text])
     isis_ms = np.array([isi_ms for isi_ms, _ in by_isi])
     shared = np.isin(isis_ms[~said], isis_ms[said]).any() or np.unique(isis_ms).size == isis_ms.size
-    has_isis = np.unique(isis_ms[said]).size > 1 or (
-        shared and min(times.values()) < _FEW <= len(texts) / 4
-    )  # or it stands for one
+    has_isis = np.unique(isis_ms[said]).size > 1  # or it stands for one
+    has_isis |= bool(shared and min(times.values()) < _FEW <= len(texts) / 4)
     return [*times] if has_isis and _are_flags(said, by_isi) and not _counts_again(column, by_isi) else []
 
 

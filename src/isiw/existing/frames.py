@@ -323,11 +323,8 @@ def _require_whole(book: Any, sheet: str, head: int) -> tuple[list[str], list[in
     with book[sheet]._get_source() as file:  # noqa: SLF001 - openpyxl does not read it in another way, row by row
         content = file.read()
     notes = (book._archive.read(name) for name in book._archive.namelist() if "comment" in name)  # noqa: SLF001 - the same
-    said = [
-        (row, "".join(_TEXT.findall(note.decode())).rpartition(":\n")[2])
-        for row, note in _NOTE.findall(b"".join(notes))
-    ]
-    left_out = "|".join(row.decode() for row, note in said if is_remark(note))
+    said = ((row, "".join(_TEXT.findall(note.decode()))) for row, note in _NOTE.findall(b"".join(notes)))
+    left_out = "|".join(row.decode() for row, note in said if is_remark(note.rpartition(":\n")[2]))
     crossed, coloured = _styled(book, lambda font, _: font.strike), _styled(book, _is_coloured)
     noted = rf'<row [^>]*?r="({left_out})"' if left_out else "(?!)"
     for pattern, are, remedy in (

@@ -264,9 +264,8 @@ def unit_of(name: str, frame: pd.DataFrame) -> str:
 def _units_above(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
     """The unit that a title says of ISIs or amplitudes, such as "MEP in µV", or "in s" if no column's name does."""
     known = {"isi": {**ISI_UNITS_MS, "samples": 1.0}, "mep": EMG_UNITS}.get(key, {})
-    said = re.findall(
-        r"(?i)([^\W\d_]+?)s?(?: are| is| sind| ist)? in ([^\W\d_]+)", f" - {frame.attrs.get('title', '')}"
-    )
+    title = f" - {frame.attrs.get('title', '')}"
+    said = re.findall(r"(?i)([^\W\d_]+?)s?(?: are| is| sind| ist)? in ([^\W\d_]+)", title)
     found = [unit for of, word in said if (unit := unit_named(word)) in known
              and (letters(of) in COLUMNS[key] or not unit_said(name, known))]  # fmt: skip
     return {"": str(found[0])} if found else {}
