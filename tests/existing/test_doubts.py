@@ -102,6 +102,8 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
                     "MEP residual", "predicted_mep", "dMEP", "MEP dB", "MEP - control", "MEP rank", "MEP^0.5")},
     "two units": (table().rename(columns={"mep_mv": "mep_mv (µV)"}), {}, "says two units; got 'uV and mV'"),
     "an ISI of 0 in many rows": (table().assign(isi_ms=np.where(ISIS > 60, ISIS, 0.0)), {}, "--alone 0 if they are"),
+    "an ISI of 0 more often than another": (table().assign(isi_ms=np.repeat([0.0, 40, 80, 120, 160], [11, 7, 6, 6, 6])),
+                                                {}, "11 rows .* have the ISI 0 ms"),
     "an ISI of -1": (table().assign(isi_ms=np.where(ISIS > 20, ISIS, -1.0)), {}, "--alone -1 if they are TMS alone"),
     "an ISI of 999": (table().assign(isi_ms=np.where(ISIS > 20, ISIS, 999.0)), {}, "4 rows .* have the ISI 999 ms"),
     "muscles as blocks": (long("block", ["FCR", "FDI"]), {}, 'comes back after another block.*--where "block=FCR"'),

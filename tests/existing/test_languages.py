@@ -40,6 +40,7 @@ def read(path: Path, layout: Layout = IMPACT) -> Delivered:
         ("Intervalo [milisegundos];Amplitud (milivoltios);Excluido", "no", "sí"),
         ("Intervallo (ms);Ampiezza MEP (mV);Escluso", "no", "sì"),
         ("Intervalle (ms);Amplitude PEM (mV);Exclu", "non", "oui"),
+        ("Intervalle (ms);Amplitude pic à pic (mV);Exclu", "non", "oui"),
         ("ISI (ms);Amplitude (mV);Uitgesloten", "nee", "ja"),
         ("Reizabstand (ms);Amplitude (mV);Ausgeschlossen", "nein", "ja"),
     ],
