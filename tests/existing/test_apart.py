@@ -38,13 +38,6 @@ def test_a_table_is_read_by_another_process_and_known_by_its_content(tmp_path: P
 
 
 @pytest.mark.slow
-def test_what_is_wrong_with_a_file_is_said_as_if_it_were_read_here(tmp_path: Path) -> None:
-    (tmp_path / "P01.csv").write_text("isi_ms,other\n10,1\n")
-    with pytest.raises(InvalidValueError, match=r"no column of P01\.csv is known to hold the amplitudes"):
-        read_people(tmp_path / "P01.csv", IMPACT)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["BrainVision", "EDF", "EEGLAB", "epochs of FIF"])
 def test_recordings_are_read_apart_as_they_are_here(kind: str, tmp_path: Path) -> None:
     (person,) = read_people(RECORDINGS[kind](tmp_path), KNOWN)

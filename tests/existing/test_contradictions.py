@@ -33,8 +33,16 @@ def of_text(text: str, folder: Path, **said: Any) -> list[Delivered]:
         "P01 session\nisi_ms,mep_mv,comment\n10,0.15\n20,.3,ok\n40,.5\n",
         "isi_ms,mep_mv\n# pause\n10,0.15\n20,.3\n# pause\n40,.5\n",
         "id,isi_ms,mep_mv\n1,10,0.15\n2,20,.3\n3,40,.5\n",
+        "isi_ms,mep_mv\n10,0.15\n20,.3\n40,.5\n\nRMT: 48 % MSO, coil: D70\n",
     ],
-    ids=["a sign at each end", "where R numbers", "cells left out below a title", "remarks", "an id of trials"],
+    ids=[
+        "a sign at each end",
+        "where R numbers",
+        "cells left out below a title",
+        "remarks",
+        "an id of trials",
+        "a foot",
+    ],
 )
 def test_rows_and_names_fit_each_other(text: str, tmp_path: Path) -> None:
     assert trials_of(of_text(text, tmp_path)) == [(10, 0.15), (20, 0.3), (40, 0.5)]

@@ -43,6 +43,7 @@ def few(bad: Any, good: Any) -> list[Any]:
         (MEPS / MEPS.mean(), "its mean is 1", STATED),
         ((MEPS / MEPS.max()).round(3), "its largest is 1", STATED),
         (np.log10(1e3 * MEPS), "scatters as little as logarithms do; got", STATED),
+        (20 * np.log10(1e3 * MEPS), "scatters as little as logarithms do; got", IN_UV),
     ],
 )
 def test_amplitudes_that_are_relative_by_their_numbers_are_asked_about(meps: Any, says: str, layout: Layout) -> None:
@@ -185,7 +186,9 @@ def test_valves_have_names_in_several_languages(name: str) -> None:
 
 def test_portuguese_and_other_words_are_found() -> None:
     for exclude, yes, alone in (("excluído", "sim", "pulso único"), ("afgekeurd", "ja", "enkele puls"),
-                                ("à exclure", "oui", "choc test"), ("da scartare", "sì", "solo TMS")):  # fmt: skip
+                                ("à exclure", "oui", "choc test"), ("da scartare", "sì", "solo TMS"),
+                                ("exclu", "oui", "TMS seule"), ("escluso", "sì", "TMS sola"),
+                                ("uitgesloten", "ja", "alleen TMS")):  # fmt: skip
         isis = [alone if np.isnan(isi) else isi for isi in ISIS]
         cells = {"ensaio": range(48), "intervalo (ms)": isis, "amplitude (mV)": MEPS, exclude: few(yes, "")}
         (person,) = read_people(pd.DataFrame(cells), Layout("impact"))

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import mne
 import numpy as np
 import pytest
 
-from existing.writers import KNOWN, NAMES, RATE_HZ, as_edf
+from existing.writers import KNOWN, NAMES, RATE_HZ
 from isiw.errors import IsiwError
 from isiw.existing.delivered import Delivered
 from isiw.existing.formats.contents import Contents, Stretch, Track, events_of
 from isiw.existing.layout import Layout
-from isiw.existing.reading import people_of_contents, read_people
+from isiw.existing.reading import people_of_contents
 
 ISIS_MS = np.where(
     np.arange(20) % 5 == 4, np.nan, np.random.default_rng(3).permutation(np.linspace(20, 172, 20)).round()
@@ -79,16 +77,6 @@ def test_codes_of_all_pairs_and_what_comes_by_itself_are_named_and_no_more() -> 
         assert isis_of(read([*EVENTS, *more])) == ISIS_MS[PAIRS].tolist()
 
 
-@pytest.mark.parametrize("name", ["artefact", "reject last trial", "bad"])
-def test_a_remark_beside_a_trial_that_leaves_it_out_is_asked_about(name: str) -> None:
-    with pytest.raises(
-        IsiwError, match=rf"may say that a trial does not count.*'{name}' at 5\.500 s.*--where \"event=\*"
-    ):
-        read([*EVENTS, (5.5, name)])
-    assert len(isis_of(read([*EVENTS, (5.5, name)], where={"event": "*"}))) == 16
-    assert len(isis_of(read([*EVENTS, (5.5, "BAD boundary")]))) == 16
-
-
 def test_a_trial_that_recording_cuts_off_is_lost_and_never_tms_alone() -> None:
     cut = read(EVENTS[1:], begin_s=float(TAPS_S[0]) + 0.001)  # just after the first tap
     assert (str(cut.trials[0].reason), len(isis_of(cut))) == ("no impact", 15)
@@ -102,27 +90,6 @@ def test_the_name_of_a_marker_that_says_another_event_is_asked_about() -> None:
     valves = [(at, "Valve" if name == NAMES["tap"] else name) for at, name in EVENTS]
     with pytest.raises(IsiwError, match=r"the marker 'Valve' of P01\.xdf counts from another event.*--marker tap=NAME"):
         read(valves, markers={"tap": "Valve"})
-
-
-def test_a_unit_that_is_stated_against_a_header_is_asked_about_until_the_header_is_said_to_be_wrong(
-    tmp_path: Path,
-) -> None:
-    path = as_edf(tmp_path, "mV", 1e3)  # whose numbers are in µV
-    with pytest.raises(IsiwError, match=r"says another unit than the one that is stated; got 'uV'; expected mV"):
-        read_people(path, KNOWN.saying(units=("uV",)))
-    (person,) = read_people(path, KNOWN.saying(units=("uV",), where={"FCR": "*"}))
-    assert person.notes[0].endswith("says mV, and uV is used, as stated.")
-    with pytest.raises(IsiwError, match=r"expected 10uV"):
-        read_people(as_edf(tmp_path, "10uV", 1e2), KNOWN.saying(units=("uV",)))
-
-
-@pytest.mark.parametrize("name", ["FCR x1000", "FCR (0.1 mV)", "EMG RMS", "mean EMG", "EMG gain 500"])
-def test_a_channel_whose_name_says_that_it_is_not_the_emg_is_asked_about(name: str) -> None:
-    made = mne.io.RawArray(1e-3 * emg_mv()[None], mne.create_info([name], RATE_HZ, ["emg"]))
-    made.set_annotations(mne.Annotations([at for at, _ in EVENTS], 0.0, [kind for _, kind in EVENTS]))
-    layout = Layout("impact", markers=NAMES, unmarked="alone", units=("V",))
-    with pytest.raises(IsiwError, match="is not EMG as it was recorded"):
-        read_people(made, layout)
 
 
 def test_a_trigger_that_bounces_or_has_few_samples_a_second_is_read_and_said() -> None:

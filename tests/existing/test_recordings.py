@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import isiw
-from existing.writers import ISIS_MS, KNOWN, NAMES, as_brainvision, as_edf, epochs, raw, require_as_written, with_stim
+from existing.writers import ISIS_MS, KNOWN, NAMES, as_brainvision, as_edf, epochs, raw, require_as_written
 from isiw.errors import IsiwError
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
@@ -30,12 +30,6 @@ def test_a_comma_that_is_not_coded_in_a_comment_of_brainvision_is_said_with_its_
     require_as_written(person)
 
 
-def test_recordings_in_memory_are_read_too() -> None:
-    for made in (raw(), epochs()):
-        (person,) = read_people(made, KNOWN, subject="P01")
-        require_as_written(person)
-
-
 @pytest.mark.parametrize("date", [None, 1_700_000_000])
 def test_a_recording_that_was_cropped_is_read_as_the_whole_one(date: int | None, tmp_path: Path) -> None:
     made = raw()
@@ -44,12 +38,6 @@ def test_a_recording_that_was_cropped_is_read_as_the_whole_one(date: int | None,
     for source in (made, tmp_path / "P01_raw.fif.gz"):
         (person,) = read_people(source, KNOWN)
         require_as_written(person)
-
-
-def test_a_trigger_channel_has_events_too() -> None:
-    made = with_stim()
-    (person,) = read_people(made, Layout(reference="impact", markers={"tap": "1", "pulse": "2"}, unmarked="alone"))
-    require_as_written(person)
 
 
 def test_the_metadata_of_epochs_say_units_and_tms_alone() -> None:
@@ -102,12 +90,6 @@ def test_several_channels_of_one_kind_are_asked_about() -> None:
     made.rename_channels({"FCR": "one"})
     with pytest.raises(IsiwError, match='--channel "emg='):
         read_people(made, Layout(reference="impact", markers=NAMES))
-
-
-@pytest.mark.parametrize(("scale", "kind"), [(1000.0, "implausible"), (1e-4, "implausible")])
-def test_a_recording_of_another_unit_does_not_count(scale: float, kind: str) -> None:
-    with pytest.raises(IsiwError, match=f"counts|{kind}|cannot be in"):
-        read_people(raw(scale), KNOWN)
 
 
 def test_a_clipped_recording_does_not_count() -> None:

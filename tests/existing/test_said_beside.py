@@ -42,7 +42,7 @@ def crossed_out(sheet: Any) -> None:
         (lambda sheet: sheet.row_dimensions.group(5, 6, hidden=True),
          "2 rows of the sheet 'Data' are hidden; got 'row 5, 6'.*called exclude"),
         (crossed_out, "1 row of the sheet 'Data' is crossed out; got 'row 7'"),
-        (lambda sheet: setattr(sheet["A8"], "comment", openpyxl.comments.Comment("Artefakt!", "EK")),
+        (lambda sheet: setattr(sheet["A8"], "comment", openpyxl.comments.Comment("EK:\ncoil moved", "EK")),
          "1 row of the sheet 'Data' is with a note, .*; got 'row 8'"),
         (lambda sheet: sheet.merge_cells("B4:B6"), "an amplitude of the sheet 'Data' is merged over several rows"),
         (lambda sheet: sheet.__setitem__("B4", "=1/2"), "1 row .* without the result of a formula; got 'row 4'"),

@@ -44,8 +44,8 @@ def lost(person: Delivered) -> list[int]:
 @pytest.mark.parametrize(
     "name",
     ["FCR ADU", "FCR (counts)", "iEMG FCR", "FCR detrended", "FCR smoothed", "FCR normalised", "FCR %MVC", "FCR log",
-     "FCR abs", "FCR_RMS50", "FCR TKEO",
-     "EMG z-score"],
+     "FCR abs", "FCR_RMS50", "FCR TKEO", "EMG z-score", "FCR x1000", "FCR (0.1 mV)", "EMG RMS", "mean EMG",
+     "EMG gain 500"],
 )  # fmt: skip
 def test_a_channel_that_is_not_emg_as_it_was_recorded_has_many_names(name: str) -> None:
     made = raw()
@@ -80,7 +80,8 @@ def test_a_channel_that_is_marked_as_bad_or_filtered_is_asked_about(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("unit", "is_asked"), [("counts", True), ("N", True), ("g", True), ("uV RMS", True), ("", False), ("n/a", False)]
+    ("unit", "is_asked"),
+    [*((unit, True) for unit in ("counts", "N", "g", "uV RMS", "mV", "10uV")), ("", False), ("n/a", False)],
 )
 def test_a_unit_of_no_voltage_is_not_overruled_in_silence(unit: str, is_asked: bool, tmp_path: Path) -> None:  # noqa: FBT001
     path, layout = as_edf(tmp_path, unit), KNOWN.saying(units=("uV",))
@@ -92,10 +93,23 @@ def test_a_unit_of_no_voltage_is_not_overruled_in_silence(unit: str, is_asked: b
 
 
 @pytest.mark.parametrize(
-    "remark", ["LostSamples: 234", "Buffer Overflow", "no tap", "muscle active", "-> out", "Comment/n. v.", "coughs"]
+    "remark",
+    [
+        "LostSamples: 234",
+        "Buffer Overflow",
+        "no tap",
+        "muscle active",
+        "-> out",
+        "Comment/n. v.",
+        "coughs",
+        "artefact",
+        "reject last trial",
+        "bad",
+    ],
 )
 def test_remarks_beside_trials_are_asked_about_whatever_their_words(remark: str) -> None:
     usual = [(0.1, "subject seated"), (5.6, "relaxed"), (7.4, "pause"), (8.0, "S 99"), (8.1, "Block 2")]
+    usual += [(5.5, "BAD boundary")]
     require_as_written(read_people(with_events(lambda rows: sorted([*rows, *usual])), KNOWN)[0])
     noted = with_events(lambda rows: sorted([*rows, *usual, (5.4, remark)]))
     said = re.escape(remark.removeprefix("Comment/"))
@@ -104,8 +118,9 @@ def test_remarks_beside_trials_are_asked_about_whatever_their_words(remark: str)
     require_as_written(read_people(noted, KNOWN.saying(where=EVERY))[0])
 
 
-def test_a_pulse_whose_trigger_is_found_twice_is_one() -> None:
-    twice = with_events(lambda rows: sorted([*rows, *((at + 0.001, name) for at, name in rows)]))
+@pytest.mark.parametrize("later_s", [0.0005, 0.0019])
+def test_a_trigger_that_is_found_twice_is_one(later_s: float) -> None:
+    twice = with_events(lambda rows: sorted([*rows, *((at + later_s, name) for at, name in rows)]))
     require_as_written(read_people(twice, KNOWN)[0])
 
 
@@ -158,9 +173,10 @@ def test_events_epochs_and_intervals_that_a_file_marks_do_not_count(tmp_path: Pa
     assert lost(read_people(tmp_path / "P01.nwb", layout)[0]) == [2]
 
 
-def test_a_half_sine_of_a_hammer_is_no_trigger() -> None:
-    force = np.convolve(pulsed(1, NAMES["tap"], 4.0), np.sin(np.linspace(0, np.pi, 24)))[: len(EMG_MV)]
-    with pytest.raises(IsiwError, match="as a wave of force or acceleration"):
+@pytest.mark.parametrize(("wave", "last"), [(np.sin(np.linspace(0, np.pi, 24)), 1.0), (np.hanning(80), 5.0)])
+def test_a_wave_of_a_hammer_is_no_trigger(wave: np.ndarray, last: float) -> None:
+    force = np.convolve(pulsed(1, NAMES["tap"], 4.0), wave)[: len(EMG_MV)] * np.linspace(1, last, len(EMG_MV))
+    with pytest.raises(IsiwError, match="'STI' has more than two levels, as a wave of force or acceleration"):
         read_people(with_stim(force, "emg"), Layout(reference="impact", channels={"emg": "FCR", "tap": "STI"}))
 
 

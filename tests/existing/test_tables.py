@@ -9,7 +9,7 @@ import pytest
 
 from isiw.errors import IsiwError
 from isiw.existing.delivered import Delivered
-from isiw.existing.layout import Layout, pairs_of, read_layout
+from isiw.existing.layout import Layout, pairs_of
 from isiw.existing.reading import read_people
 
 ISIS = [10.0, 20.5, 30.0, 40.0, 55.25]
@@ -43,10 +43,6 @@ def test_a_table_of_another_program_is_read_to_the_last_digit(suffix: str, tmp_p
     (person,) = read_people(path, IMPACT)
     assert trials_of([person]) == list(zip(ISIS, MEPS, strict=True))
     assert person.subject == "P01"
-
-
-def test_a_data_frame_is_read_as_it_is() -> None:
-    assert trials_of(read_people(frame(), IMPACT)) == list(zip(ISIS, MEPS, strict=True))
 
 
 def test_microvolts_become_the_nearest_millivolts() -> None:
@@ -103,12 +99,6 @@ def test_the_mark_of_tms_alone_is_what_somebody_says(mark: str, cell: Any) -> No
     table = pd.DataFrame({"isi_ms": pd.Series([10.0, cell, 20.0], dtype=object), "mep_mv": [0.1, 0.2, 0.3]})
     (person,) = read_people(table, Layout(reference="impact", alone=mark))
     assert [trial.is_control for trial in person.trials] == [False, True, False]
-
-
-def test_columns_of_which_nothing_is_read_are_named() -> None:
-    (person,) = read_people(frame(note=["", "pause", "", "", ""], Ausschluss=["", "x", "", "", ""]), IMPACT)
-    assert person.unused == ("note",)
-    assert [trial.counts for trial in person.trials] == [True, False, True, True, True]
 
 
 @pytest.mark.parametrize(
@@ -176,16 +166,6 @@ def test_trials_were_given_at_the_latest_when_their_dates_allow(dates: list[str]
     table = pd.DataFrame({"isi_ms": [10.0, 20.0], "mep_mv": [0.1, 0.2], "date": dates})
     (person,) = read_people(table, IMPACT)
     assert person.given_by == given_by
-
-
-def test_a_layout_is_read_of_a_file(tmp_path: Path) -> None:
-    (tmp_path / "signal.toml").write_text(
-        'reference = "impact"\nskip_lines = 2\nseparator = "\\t"\nunits = ["s", "mV"]\n'
-        'names = ["frame", "state", "delay", "peak"]\n[columns]\nisi = "delay"\nmep = "peak"\n'
-    )
-    (tmp_path / "a.txt").write_text("Signal\nexport\n1\t2\t0.01\t0.5\n2\t2\t0.02\t0.7\n3\t2\t0.03\t0.8\n")
-    found = trials_of(read_people(tmp_path / "a.txt", read_layout(tmp_path / "signal.toml")))
-    assert found == [(10.0, 0.5), (20.0, 0.7), (30.0, 0.8)]
 
 
 WRITTEN: dict[str, tuple[str, str, dict[str, Any]]] = {
@@ -271,13 +251,6 @@ def test_days_are_numbers_in_their_names_or_are_counted(days: list[str], numbers
     assert [(one.visit.day, len(one.trials)) for one in people] == list(zip(numbers, [2, 3], strict=True))
 
 
-def test_a_column_of_conditions_says_which_trials_are_tms_alone() -> None:
-    kinds = ["paired", "single-pulse", "paired"]
-    table = pd.DataFrame({"condition": kinds, "isi_ms": [10, None, 20], "mep_mv": [0.1, 0.2, 0.3]})
-    (person,) = read_people(table, IMPACT)
-    assert [trial.is_control and trial.told for trial in person.trials] == [False, True, False]
-
-
 def test_each_column_has_a_unit_of_its_own() -> None:
     table = frame().assign(**{"nominal ISI (s)": [isi / 1e3 for isi in ISIS], "background (mV)": [0.002] * 5})
     (person,) = read_people(table, IMPACT)
@@ -312,18 +285,15 @@ BROKEN: dict[str, tuple[str, dict[str, Any], str]] = {
     "a comma that may be of thousands": ("isi_ms;mep_mv\n10;1,250\n20;2,300\n", {}, "--decimal ,"),
     "a comma among points": ("isi_ms;mep_mv\n10;0.5\n20;1.250,5\n", {}, "is no number"),
     "an unknown status": ("isi_ms,mep_mv,status\n10,0.1,perhaps\n", {}, "neither yes nor no"),
-    "rows in another order": ("trial,isi_ms,mep_mv\n2,10,0.1\n1,20,0.2\n", {}, "not in the order"),
     "no date": ("isi_ms,mep_mv,date\n10,0.1,yesterday\n20,0.3,yesterday\n", {}, "is no date"),
     "more cells than names": (HEAD + "10,0.1\n20,0.3,4,5\n", {}, "no table that can be read"),
     "a decimal comma that also separates": (HEAD + "10,5,0,1\n20,5,0,2\n", {}, "another separator"),
     "a point that may be of thousands": ("isi_ms;mep_uv\n10;1.250\n20;980\n", {}, "--decimal"),
     "a trial in two rows": ("trial,isi_ms,mep_mv\n1,10,0.1\n1,10,0.3\n2,20,0.2\n", {}, "'1'.*Leave one row"),
-    "a mean at the end": ("trial,isi_ms,mep_mv\n1,10,0.1\n2,20,0.3\nMean,15,0.2\n", {}, "Delete the row"),
-    "times that go back": ("time,isi_ms,mep_mv\n09:10,10,0.1\n09:05,20,0.3\n", {}, "not in the order"),
     "a person in some rows only": ("subject,isi_ms,mep_mv\nA,10,0.1\n,20,0.3\n", {}, "into each row"),
     "two files in one": (HEAD + "10,0.1\n20,0.3\n" + HEAD + "10,0.2\n", {}, "row 3 of the column 'isi_ms'"),
-    "amplitudes in percent": ("isi_ms,MEP (% of baseline)\n10,120\n20,80\n", {}, "relative to others"),
     "milliseconds in a column of seconds": ("isi_s,mep_mv\n10,0.1\n20,0.3\n30,0.2\n", {}, "--unit ms"),
+    "millivolts in µV that are small": ("isi_ms,mep_uv\n10,0.1\n20,3\n30,1.2\n", {}, "--unit mV"),
     "millivolts in a column of microvolts": ("isi_ms,mep_uv\n10,0.1\n20,0.3\n30,0.2\n", {}, "--unit mV"),
     "bytes": ("\0\1\0\1\2\1\2", {}, "is no text"),
     "an ISI that is empty": (HEAD + "single,.1\n,.9\n20,.2\n30,.3\n", {"alone": "single"}, "1 row has an amplitude"),

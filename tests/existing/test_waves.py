@@ -111,15 +111,6 @@ def test_a_part_of_a_file_is_a_table_with_names_of_its_own(tmp_path: Path) -> No
     require_as_written(read(tmp_path, content, layout))
 
 
-def test_measurements_of_frames_are_a_table(tmp_path: Path) -> None:
-    rows = "".join(
-        f"{n}\t{n % 3}\t{isi}\t{mep}\n"
-        for n, (isi, mep) in enumerate(zip((*ISIS_MS, -1), (*MEPS_MV, 0.3), strict=True))
-    )
-    layout = 'alone = "-1"\n[columns]\nmep = "EMG pk-pk (mV)"\norder = "Frame"\n'
-    require_as_written(read(tmp_path, f'"Frame"\t"State"\t"ISI (ms)"\t"EMG pk-pk (mV)"\n{rows}', layout))
-
-
 def matrix(path: Path, said: str, *, turned: bool = False) -> Delivered:
     firsts = [round((at_s - 0.4) * RATE_HZ) for at_s, name in EVENTS if name == NAMES["pulse"]]
     emg = np.array([EMG_MV[first : first + 2400] for first in firsts])

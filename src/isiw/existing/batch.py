@@ -76,9 +76,8 @@ def read_files(
     why = spelt_otherwise(one.delivered.subject for one in everybody)
     people = [one._replace(refused=why.get(code)) for one in everybody if only in {None, code := one.delivered.subject}]
     if only is not None and not people:
-        raise InvalidValueError(
-            "no person has this code", got=only, expected=codes_of([one.delivered for one in everybody])
-        )
+        expected = codes_of([one.delivered for one in everybody])
+        raise InvalidValueError("no person has this code", got=only, expected=expected)
     found = _placed(people, output)
     for person in found:
         if person.log is not None and person.refused is None and log_exists(person.log) and not is_there(person):
@@ -124,19 +123,14 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
         return [one._replace(log=Path(output)) for one in people]
     if Path(output).suffix and not Path(output).is_dir():
         what = "the output is neither a log nor a folder"
-        remedy = (
-            "Name a log (.mcap), or a folder for a log of each person; one with a full stop in its name make first."
-        )
+        remedy = "Name a log (.mcap), or a folder for a log of each person; make it first if its name has a full stop."
         raise InvalidValueError(what, got=str(output), remedy=remedy)
     days = [f"_day{day}" if (day := one.delivered.visit.day) else "" for one in people]
     stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]
     times = Counter(map(folded, stems))  # names that are two here may be one file on other computers
-    return [
-        one._replace(
-            log=Path(output) / f"{stem}.mcap", refused=_no_log_of_its_own(stem, times[folded(stem)]) or one.refused
-        )
-        for one, stem in zip(people, stems, strict=True)
-    ]
+    why = (_no_log_of_its_own(stem, times[folded(stem)]) for stem in stems)
+    return [one._replace(log=Path(output) / f"{stem}.mcap", refused=refused or one.refused)
+            for one, stem, refused in zip(people, stems, why, strict=True)]  # fmt: skip
 
 
 def code_in_names(subject: str) -> str:

@@ -16,6 +16,7 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError
 from isiw.existing.layout import ISI_UNITS_MS, WORDS, Layout, plain, unit_named
+from isiw.existing.names import ALL
 from isiw.lazy import pd
 from isiw.types import FloatArray
 
@@ -87,6 +88,7 @@ class Column:
     factor: float = 1.0  # that turns a number into ms, mV or µV
     of_codes: bool = False  # of people, who may be called NA
     remedy: str = "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
+    is_stated: bool = False  # whether `where` has it, so that it is what it says, however odd
 
     def number(self, row: int) -> float | None:
         """The number in a row [ms, mV or µV]; None if the cell is empty."""
@@ -144,9 +146,14 @@ class Column:
 
     def doubted(self, why: str, got: object, remedy: str, expected: str | None = None) -> InvalidValueError:
         """The error that a column cannot be read."""
-        return InvalidValueError(
-            f"the column {self.name!r} of {self.of} {why}", got=got, expected=expected, remedy=remedy
-        )
+        what = f"the column {self.name!r} of {self.of} {why}"
+        return InvalidValueError(what, got=got, expected=expected, remedy=remedy)
+
+    def doubt(self, why: str, got: object, remedy: str, expected: str | None = None, row: int | None = None) -> None:
+        """Raise that a column, or its cell of a row, may be something else, if `where` does not have it."""
+        if not self.is_stated:
+            remedy = f'{remedy}, say --where "{self.name}={ALL}".'
+            raise self.doubted(why, got, remedy, expected) if row is None else self.refused(row, why, remedy)
 
 
 def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str, Column]:
@@ -195,7 +202,7 @@ def required_unit(layout: Layout, known: Mapping[str, float], said: str | None, 
     return unit
 
 
-def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:
+def without_unit_in_cells(name: str, cells: Sequence[Any]) -> tuple[str, Sequence[Any]]:
     """A column whose cells all say the same unit, such as "12.5 ms", as one whose name says it."""
     texts = [cell for cell in cells if not is_missing(cell) and not says_alone(cell, None)]
     unit, *others = {_NUMBER_BEFORE.sub("", cell.casefold()) if isinstance(cell, str) else "" for cell in texts} or {""}

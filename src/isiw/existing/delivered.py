@@ -27,6 +27,7 @@ from isiw.trials import Trial, TrialTable
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit
 
+_QUIET_MV: Final = 1.5e-3  # the noise of an amplifier has more from peak to peak
 LONGEST_ISI_MS: Final = 5000.0  # no tap is studied after a longer interval; a larger number is in another unit
 
 
@@ -127,7 +128,7 @@ class Delivered:
             longest = longest_ms / ISI_UNITS_MS[of_isis]
             fits = [unit for unit in ("ms", "s", "us") if 1 <= longest * ISI_UNITS_MS[unit] <= LONGEST_ISI_MS]
             self._refuse_unit("ISIs", "isi", f"at most {longest:g} {of_isis}", of_isis, fits)
-        if implausible_scale(meps_mv) is not None or usual_mv > AMPLITUDE_MV.most:
+        if implausible_scale(meps_mv) is not None or usual_mv > AMPLITUDE_MV.most or 0 < usual_mv < _QUIET_MV:
             usual = usual_mv / EMG_UNITS[of_meps]
             fits = [unit for unit in ("mV", "uV", "V", "nV") if 0.01 <= usual * EMG_UNITS[unit] <= AMPLITUDE_MV.most]
             self._refuse_unit("amplitudes", "mep", f"{usual:.3g} {of_meps} in the median", of_meps, fits)

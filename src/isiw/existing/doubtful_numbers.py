@@ -13,7 +13,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import LONGEST_ISI_MS
 from isiw.existing.layout import COLUMNS, EMG_UNITS, letters, unit_in
-from isiw.existing.names import ALL, RELATIVE, WHOLE, words_of
+from isiw.existing.names import RELATIVE, WHOLE, words_of
 from isiw.findings import AMPLITUDE_MV
 from isiw.types import FloatArray
 
@@ -32,14 +32,14 @@ _WITH, _ITS_HALF, _EXACT = 0.8, 0.7, 0.02  # halves correlate so with amplitudes
 _FEW, _FEWEST = 3, 12  # in a table with fewer rows ISIs may come again by chance
 _LONG_BEFORE_MS: Final = 50.0  # no pulse is given so long before the tap
 _NO_MEP: Final = {"none", "n.d.", "k.a.", "-", "--", "–", "—", ".", "?"}  # in an amplitude's place
-_LOGS, _LOG_CV = (1.0, 12.0), 0.3  # logarithms of µV are among these, and scatter so little
+_LOGS, _LOG_CV = ((1.0, 12.0), (25.0, 90.0)), 0.3  # logarithms of µV are among these, or in dB, and scatter so little
 _NEAR_MS, _ALIKE = (1.0, 25.0), 0.98  # so far from each other are ISIs that were asked and measured, and so alike
 
 
 def require_plain_numbers(columns: Columns) -> None:
     """Raise if the numbers of ISIs and amplitudes seem to be something else, in two units, or of each row twice."""
-    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each, _require_absolute, _require_uncut,
-                  _require_whole):  # fmt: skip
+    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each, _require_whole, _require_absolute,
+                  _require_uncut):  # fmt: skip
         doubt(columns)
 
 
@@ -54,11 +54,10 @@ def _require_isis(columns: Columns) -> None:
     isi, paired = columns["isi"], columns.paired
     isis_ms = [isi.number(row) for row in paired]
     before = [isi_ms for isi_ms in isis_ms if (isi_ms or 0.0) < 0]
-    if len({*before}) > 1 and 2 * len(before) > len(paired) > 2 and isi.name not in columns.layout.where:
-        what = f"most ISIs of {isi.of} are below 0, as if the pulse came before the tap"
-        remedy = "If the tap came first, write them without the sign; if not, so that these trials do not count, say "
-        remedy += f'--where "{isi.name}={ALL}".'
-        raise InvalidValueError(what, got=f"{len(before)} of {len(paired)}", remedy=remedy)
+    if len({*before}) > 1 and 2 * len(before) > len(paired) > 2:
+        remedy = "If the tap came first, write them without the sign; if not, so that these trials do not count"
+        why, got = "has most ISIs below 0, as if the pulse came before the tap", f"{len(before)} of {len(paired)}"
+        isi.doubt(why, got, remedy)
     if columns.layout.alone is not None or len(paired) < len(columns.rows):
         return
     times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
@@ -67,14 +66,12 @@ def _require_isis(columns: Columns) -> None:
         if times[odd] < 3 or len(others) < 2:
             continue
         apart = odd <= 0 or odd > 2 * max(others)
-        frequent = apart and (times[odd] >= 2 * max(others.values()) or _is_named(columns, odd))
-        frequent |= times[odd] >= 2 * _FEW and max(others.values()) < _FEW and len(others) >= _FEWEST
-        if (
-            frequent
-            or odd in {-1, -9, 99, 999}
-            or (odd < -_LONG_BEFORE_MS and len({*before}) == 1)
-            or odd > max(499.0, 2 * max(others))
-        ):
+        strange = odd in {-1, -9, 99, 999} or odd > max(499.0, 2 * max(others))
+        strange |= odd < -_LONG_BEFORE_MS and len({*before}) == 1
+        usual = max(others.values())
+        strange |= apart and (times[odd] >= min(2 * usual, max(1.5 * usual, usual + _FEW)) or _is_named(columns, odd))
+        strange |= times[odd] >= 2 * _FEW > 2 * usual and len(others) >= _FEWEST
+        if strange:
             what = f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone"
             remedy = f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never."
             raise InvalidValueError(what, expected="what an ISI is, and what is TMS alone", remedy=remedy)
@@ -101,10 +98,10 @@ def _require_no_codes(columns: Columns) -> None:
         counts = len(kinds) > 2 and kinds in ([*range(len(kinds))], [*range(1, len(kinds) + 1)])
         are_codes = counts and ("order" not in columns.of or len(numbers) >= 2 * len(kinds))  # or numbers of rows
         are_codes |= key == "mep" and len(kinds) < 3 and kinds != [0.0]
-        if are_codes and len(numbers) >= _FEWEST and column.name not in columns.layout.where:
+        if are_codes and len(numbers) >= _FEWEST:
             remedy = "Write what they stand for, or name the column of the numbers themselves: --column "
-            remedy += f'{key}=NAME; if these are, say --where "{column.name}={ALL}".'
-            raise column.doubted("seems to have codes", ", ".join(f"{kind:g}" for kind in kinds[:5]), remedy)
+            got = ", ".join(f"{kind:g}" for kind in kinds[:5])
+            column.doubt("seems to have codes", got, f"{remedy}{key}=NAME; if these are")
 
 
 def _require_one_column_each(columns: Columns) -> None:
@@ -121,25 +118,27 @@ def _require_one_column_each(columns: Columns) -> None:
         off_ms = abs(isi.factor * float(np.median(others - isis)))
         is_near = _NEAR_MS[0] < off_ms < _NEAR_MS[1] and np.ptp(others) > 0 and np.corrcoef(isis, others)[0, 1] > _ALIKE
         is_further = stems[name] in map(stems.get, alike) and np.isfinite(others).any()
-        if name not in columns.layout.where and (is_further or (is_near and not is_stated)):
+        if is_further or (is_near and not is_stated):
             remedy = "If they are further trials, write a row for each; if both are of the same trials, say --column "
-            remedy += f'isi=NAME with the ISIs that were measured; if it is something else, say --where "{name}={ALL}".'
-            raise column.doubted(f"is like {' or '.join(alike)}, and is not read", None, remedy)
+            remedy += "isi=NAME with the ISIs that were measured; if it is something else"
+            column.doubt(f"is like {' or '.join(alike)}, and is not read", None, remedy)
 
 
 def _require_one_unit(columns: Columns) -> None:
     """Raise if some numbers cannot be what they are, are about a thousand times the others, and none lies between."""
-    mep, codes = columns["mep"], {"99", "999", "9999"} if columns["mep"].name not in columns.layout.where else ()
-    coded = [row for row in columns.rows if mep.text(row).removesuffix(".0") in codes]
+    mep = columns["mep"]
+    coded = [row for row in columns.rows if mep.text(row).removesuffix(".0") in {"99", "999", "9999"}]
     words = {row: cell.strip() for row in columns.rows if isinstance(cell := mep.cells[row], str)}
     said = [row for row, word in words.items() if word.casefold() in _NO_MEP and word != "None"]
     said = [row for row in said if columns.lost(row) is None and not columns.tap_alone(row)]
-    if said and mep.name not in columns.layout.where:
-        remedy = f'{mep.remedy} If all such trials are lost, say --where "{mep.name}={ALL}".'
-        raise mep.refused(said[0], "may say that there was no MEP, or that it is not known", remedy)
-    if len(coded) >= _FEW and len({mep.text(row) for row in coded}) == 1:
-        remedy = f'If it does, leave these cells empty; if not, say --where "{mep.name}={ALL}".'
-        raise mep.refused(coded[0], "may stand for no amplitude", remedy)
+    if said:
+        remedy = f"{mep.remedy} If all such trials are lost"
+        mep.doubt("may say that there was no MEP, or that it is not known", None, remedy, row=said[0])
+    others = [number for row in {*columns.rows} - {*coded} if (number := mep.number(row)) is not None]
+    are_apart = bool(coded) and (mep.number(coded[0]) or 0.0) > 2 * max(others, default=np.inf)
+    if (len(coded) >= _FEW or are_apart) and len({mep.text(row) for row in coded}) == 1:
+        remedy = "If it does, leave these cells empty; if not"
+        mep.doubt("may stand for no amplitude", None, remedy, row=coded[0])
     for key, (least, most) in _POSSIBLE.items():
         column = columns[key]
         numbers = np.sort([number for row in columns.paired if (number := column.number(row)) and number > 0])
@@ -157,7 +156,7 @@ def _require_absolute(columns: Columns) -> None:
     mep, alone, odd = columns["mep"], {*columns.rows} - {*columns.paired}, dict[str, tuple[float, float, float]]()
     rows = [row for row in columns.rows if mep.number(row) and columns.lost(row) is None and not columns.tap_alone(row)]
     step = 10.0 ** -max((len(mep.texts[row].replace(",", ".").partition(".")[2]) for row in rows), default=0)
-    if len(rows) < _FEW or mep.name in columns.layout.where:
+    if len(rows) < _FEW:
         return
     if (of_alone := mep.numbers[[row for row in rows if row in alone]]).size:
         by_mean = 0.0 if of_alone.size >= _FEW and np.ptp(of_alone) == 0 else step / of_alone.size**0.5
@@ -167,15 +166,14 @@ def _require_absolute(columns: Columns) -> None:
     of_all = mep.numbers[rows]
     odd["mean"] = float(of_all.mean()), step / len(rows) ** 0.5, _FINE
     odd["largest"] = float(of_all.max()), step, _FINE
-    remedy = "Name the column of the amplitudes themselves: --column mep=NAME; if these are, say --where "
-    remedy += f'"{mep.name}={ALL}".'
-    are_logs = _LOGS[0] < of_all.min() < of_all.max() < _LOGS[1] and of_all.std() < _LOG_CV * of_all.mean()
-    if are_logs and len(rows) >= _FEWEST:
-        raise mep.doubted("scatters as little as logarithms do", f"{of_all.min():g} to {of_all.max():g}", remedy)
+    remedy = "Name the column of the amplitudes themselves: --column mep=NAME; if these are"
+    are_logs = any(least < of_all.min() < of_all.max() < most for least, most in _LOGS)
+    if are_logs and of_all.std() < _LOG_CV * of_all.mean() and len(rows) >= _FEWEST:
+        mep.doubt("scatters as little as logarithms do", f"{of_all.min():g} to {of_all.max():g}", remedy)
     for (what, (number, rounded, most)), one in product(odd.items(), (1.0, 100.0)):
         if rounded <= most * one and abs(number - one) <= max(rounded if "mean" in what else 0.0, 1e-9 * one):
             expected = "peak-to-peak amplitudes in mV, µV or V"
-            raise mep.doubted(f"seems to be relative: its {what} is {one:g}", None, remedy, expected)
+            mep.doubt(f"seems to be relative: its {what} is {one:g}", None, remedy, expected)
 
 
 def _require_uncut(columns: Columns) -> None:
@@ -186,11 +184,10 @@ def _require_uncut(columns: Columns) -> None:
     for odd, is_what in ((max(times, default=0.0), "saturated"), (min(times, default=0.0), "below a limit")):
         usual = max((count for number, count in times.items() if number != odd), default=len(rows))
         apart = times[odd] >= _FEW and odd > 2 * max((number for number in times if number != odd), default=odd)
-        if len(rows) >= _FEWEST and (times[odd] >= _FEW * usual or apart) and mep.name not in columns.layout.where:
+        if len(rows) >= _FEWEST and (times[odd] >= _FEW * usual or apart):
             remedy = "Write 0 for an MEP below the limit, and leave the cell of a saturated one empty; if all are as "
-            remedy += f'they were measured, say --where "{mep.name}={ALL}".'
             got = f"{times[odd]} times {odd / mep.factor:g}"
-            raise mep.doubted(f"has amplitudes that seem to be {is_what}", got, remedy)
+            mep.doubt(f"has amplitudes that seem to be {is_what}", got, f"{remedy}they were measured")
 
 
 def _require_whole(columns: Columns) -> None:
@@ -202,21 +199,21 @@ def _require_whole(columns: Columns) -> None:
     for name, shares in halves.items():
         too_large = np.mean(shares > 1 + _EXACT) > _EXACT or (not is_whole and np.nanmedian(shares) > _ITS_HALF)
         if too_large or (is_half and not is_whole):
-            remedy = "Name the column from peak to peak: --column mep=NAME, or add one; if it is this one, say --where "
+            remedy = "Name the column from peak to peak: --column mep=NAME, or add one; if it is this one"
             why = f"seems to have one half of each MEP, and {name!r} beside it the other one"
-            raise mep.doubted(why, None, f'{remedy}"{mep.name}={ALL}".', "amplitudes from peak to peak")
+            mep.doubt(why, None, remedy, "amplitudes from peak to peak")
 
 
 def _halves_beside(columns: Columns) -> dict[str, FloatArray]:
     """Unused columns of halves of the same MEPs, as shares of the amplitudes; raise if one has the MEPs themselves."""
-    mep, stated, halves = columns["mep"], columns.layout.where.keys(), dict[str, FloatArray]()
-    meps, is_bare = mep.numbers[columns.rows], "mep" not in columns.layout.columns and not _has_unit(mep.name)
-    for name, column in columns.beside.items() if mep.name not in stated else ():
+    mep, halves = columns["mep"], dict[str, FloatArray]()
+    meps, is_bare = mep.numbers[columns.rows], not (unit_in(mep.name) in EMG_UNITS or "mep" in columns.layout.columns)
+    for name, column in columns.beside.items():
         numbers, words = column.numbers[columns.rows], words_of(name)
         shares = np.abs(numbers) / np.where(meps > 0, meps, np.nan)
-        if name in stated or (known := np.isfinite(shares)).sum() < _FEWEST:
+        if column.is_stated or mep.is_stated or (known := np.isfinite(shares)).sum() < _FEWEST:
             continue
-        if is_bare and _has_unit(name) and not re.search(f"{_OF_REST}|{_HALF}|{RELATIVE}", words):
+        if is_bare and unit_in(name) in EMG_UNITS and not re.search(f"{_OF_REST}|{_HALF}|{RELATIVE}", words):
             remedy = f'Say --column "mep={name}", or --column "mep={mep.name}".'
             why = f"says a unit of amplitudes, and {mep.name!r} says none: which has the MEPs?"
             raise column.doubted(why, None, remedy)
@@ -225,16 +222,11 @@ def _halves_beside(columns: Columns) -> dict[str, FloatArray]:
             continue
         is_whole = (re.search(WHOLE, words) or letters(name) in COLUMNS["mep"]) and not re.search(RELATIVE, words)
         if is_whole and 1.2 < np.nanmedian(shares) < 5:
-            remedy = f'Say --column "mep={name}"; if it is something else, say --where "{name}={ALL}".'
-            raise column.doubted(f"has larger amplitudes of the same trials than {mep.name!r}", None, remedy)
+            why = f"has larger amplitudes of the same trials than {mep.name!r}"
+            column.doubt(why, None, f'Say --column "mep={name}"; if it is something else')
         if re.search(_HALF, words) or np.mean(numbers < 0) > _WITH:
             halves[name] = shares
     return halves
-
-
-def _has_unit(name: str) -> bool:
-    """True if a name has the unit of an amplitude."""
-    return unit_in(name) in EMG_UNITS
 
 
 def _require_one_row_each(columns: Columns) -> None:

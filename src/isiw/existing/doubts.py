@@ -6,9 +6,9 @@ import math
 import re
 import statistics
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import groupby, pairwise
+from itertools import combinations, groupby, pairwise
 from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
@@ -18,10 +18,10 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import WORDS, Layout, letters, plain, unit_in
-from isiw.existing.names import ALL, MEANS, TITLES_OF_MEANS, is_remark, is_verdict, require_title, says_only, words_of
+from isiw.existing.names import MEANS, TITLES_OF_MEANS, is_remark, is_verdict, require_title, says_only, words_of
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
-from isiw.types import BoolArray, FloatArray
+from isiw.types import BoolArray, FloatArray, Reference
 
 if TYPE_CHECKING:
     from isiw.existing.quantities import Columns
@@ -32,6 +32,7 @@ _FEW, _BELOW_AT_MOST, _BELOW = 3, 20, 50  # so many rows at most are below the t
 _SEVERAL: Final = 12  # in a table with fewer rows most may be left out
 _CODE: Final = 4  # a shorter text in rows that follow may be initials
 _ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
+_ALONE_AT_MOST: Final = 2  # so few rows without an ISI are no baseline that was measured after all pairs
 _ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
 _LAST: Final = 2000  # so many rows at most are compared with those below them
@@ -39,44 +40,38 @@ _USUAL: Final = 10  # figures are what stands below trials in most files, the fi
 _CHANCE: Final = 0.02  # with which single trials are hardly by chance what they seem
 _NO_REMARKS: Final = WORDS["alone"] | WORDS["tap alone"] | WORDS["yes"]
 _BELOW_TRIALS: Final = "Delete the rows below the trials; if these are trials, number all in a column called trial."
+_IS_FIGURE: Final = "seems to be a mean of rows above, or an SD"
 _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
 
-def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout: Layout) -> None:
+def require_single_trials(
+    mep: Column, isi: Column, others: Sequence[Column], frame: pd.DataFrame, reference: Reference | None
+) -> None:
     """Raise if rows are means of several trials, or relative: their column says so, a title, or what is beside them."""
-    source = mep.of
-    others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
-    spreads = [name for name in others if says_only(name, WORDS["spreads"])]
-    numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in WORDS["numbers"]}
-    averaged = [name for name in numbers if re.search("sweep|averag|mep", letters(name))]
-    counted_in = [name for name, texts in numbers.items() if 2 * len({*texts}) <= len(texts)
-                  and all(text.isdigit() and int(text) > 1 for text in texts)]  # fmt: skip
-    kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
-    rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
-    once = len(rows) > 2 and len({*rows}) == len(rows)
+    spreads = [one.name for one in others if says_only(one.name, WORDS["spreads"])]
+    numbers = [one for one in others if letters(one.name) in WORDS["numbers"]]
+    counted_in = [one.name for one in numbers if 2 * len({*one.texts}) <= len(one.texts)
+                  and all(text.isdigit() and int(text) > 1 for text in one.texts)]  # fmt: skip
+    kinds = [one.texts for one in others if one.name != isi.name and 3 * len({*one.texts}) <= len(one.texts)]
+    once = len(isi.cells) > 2 and len({*zip(isi.texts, *kinds, strict=True)}) == len(isi.cells)
     known = WORDS["spreads"] | WORDS["sums"] | WORDS["means"]
-    for name, cells in others.items():
-        for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
-            if says_only(odd, known) and not (
-                len(odd) < _CODE and any(one == other == odd for one, other in pairwise(cells))
-            ):
+    for one in others:
+        for odd in dict.fromkeys(cell for cell in one.cells if isinstance(cell, str) and says_only(cell, known)):
+            if len(odd) >= _CODE or not any(cell == other == odd for cell, other in pairwise(one.cells)):
                 remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
-                raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
-    heading = f"{source}\n{frame.attrs.get('title', '')}"
-    if mep.name not in layout.where:
-        bare = [row for row, cells in enumerate(zip(mep.texts, isi.texts, strict=True)) if not any(cells)]
-        below = [", ".join(cell for cells in others.values() if isinstance(cell := cells[row], str)) for row in bare]
-        require_title("\n".join([heading, *below]), mep, layout.reference, frame.attrs.get("notes", ""))
+                raise one.refused(one.cells.index(odd), "is none of a trial", remedy)
+    heading = f"{mep.of}\n{frame.attrs.get('title', '')}"
+    bare = [row for row, cells in enumerate(zip(mep.texts, isi.texts, strict=True)) if not any(cells)]
+    below = [", ".join(cell for one in others if isinstance(cell := one.cells[row], str)) for row in bare]
+    require_title("\n".join([heading, *below]), mep, reference, frame.attrs.get("notes", ""))
     title = TITLES_OF_MEANS.search(words_of(heading)) if once else None
-    is_counted = bool(counted_in) and (once or counted_in[0] in averaged)
-    numeric = [Column(name, cells).numbers for name, cells in others.items()] if once and len(others) < _BELOW else []
-    spreads += [
-        name for name, one in zip(others, numeric, strict=False) if not np.allclose(one, mep.numbers, rtol=0.01)
-        and any(np.allclose(one + other, 2 * mep.numbers, rtol=0.01) for other in numeric)
-    ]  # fmt: skip # such as limits of confidence
+    is_counted = bool(counted_in) and (once or re.search("sweep|averag|mep", letters(counted_in[0])))
+    limits = [one for one in others if not np.allclose(one.numbers, mep.numbers, rtol=0.01)] if once else []
+    for one, other in combinations(limits if len(others) < _BELOW else (), 2):  # such as those of confidence
+        spreads += [one.name] if np.allclose(one.numbers + other.numbers, 2 * mep.numbers, rtol=0.01) else []
     if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or is_counted:
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
-        what = f"the rows of {source} are means of several trials, by the column {mep.name!r}"
+        what = f"the rows of {mep.of} are means of several trials, by the column {mep.name!r}"
         what += "".join(f" beside {name!r}" for name in beside)
         expected = "a row for each trial, since the scatter of single trials says how sure a window is"
         remedy = "Export the single trials; if these are, rename the column."
@@ -84,65 +79,47 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, layout:
 
 
 def require_no_summaries(columns: Columns, apart: int | None) -> None:
-    """Raise if rows from one `apart` on, or with more digits than others, are by their numbers means or SDs."""
+    """Raise if the last rows, such as those from one `apart` on, or some between parts, are figures of those above."""
     isi, mep, order = columns["isi"], columns["mep"], columns["order"]
     numbers = {row: number for row in columns.rows if (number := mep.number(row)) is not None}
-    known, meps = [*numbers], np.array([*numbers.values()]) / mep.factor
-    isis = isi.numbers[known]
-    digits = [_digits(mep, row) for row in known]
+    known, meps = [*numbers][-_LAST:], np.array([*numbers.values()])[-_LAST:] / mep.factor
+    isis, digits = isi.numbers[known], np.array([len(mep.texts[row].partition(mep.decimal)[2]) for row in known])
+    slacks = np.maximum(0.51 * 10.0**-digits, 1e-9 * np.abs(meps))
     below = next((n for n, row in enumerate(known) if apart is not None and row >= apart), len(known))
-    for begin in sorted(
-        {max(below, len(known) - _BELOW), *range(max(len(known) - _FEW, 0), len(known))} - {len(known)}
-    ):
-        above, of_isis = meps[:begin], isis[:begin]
-        agree = [_is_summary(meps[n], digits[n], above, above[of_isis == isis[n]]) for n in range(begin, len(known))]
-        if len(above) < _FEW or order.text(known[begin]) or 2 * sum(agree) <= len(agree):
+    begins = {max(below, len(known) - _BELOW), *range(max(len(known) - _BELOW_AT_MOST, _FEW), len(known))}
+    for begin in sorted(begins - {len(known), *range(_FEW)}):
+        finer = digits[begin] > digits[:begin].max() or np.isclose(isis[begin], np.nanmean(isis[:begin]), rtol=1e-3)
+        is_own = (below == begin or finer) and meps[begin] not in meps[:begin]
+        if order.text(known[begin]) or not (is_own or np.isnan(isis[begin:]).all()):
             continue
-        finer = digits[begin] > max(digits[:begin]) or np.isclose(isis[begin], np.nanmean(of_isis), rtol=1e-3)
-        if below == begin or (finer and agree[0]):
-            raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
-    unnumbered = [n for n, row in enumerate(known) if not order.text(row) and "order" in columns.of]
-    if (
-        unnumbered
-        and len(known) - unnumbered[0] == len(unnumbered) <= _BELOW_AT_MOST
-        and not np.isfinite(isis[unnumbered]).any()
-    ):
-        why = f"has no ISI, and no number in the column {order.name!r}, as a mean or a sum has"
-        raise mep.refused(known[unnumbered[0]], why, _BELOW_TRIALS)
-    _require_none_below(mep, isi, known[-_LAST:], apart)
-    most = max(digits, default=0)
-    begins = [-1, *(n for n, count in enumerate(digits) if count == most)]
-    parts = [(end, meps[begin + 1 : end]) for begin, end in pairwise(begins)]  # each below trials of its own
-    if 1 < len(begins) <= len(known) / _ROWS_A_PART and all(_is_summary(meps[n], digits[n], one) for n, one in parts):
-        raise mep.refused(known[begins[1]], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
-
-
-def _require_none_below(mep: Column, isi: Column, known: Sequence[int], apart: int | None) -> None:
-    """Raise if the last rows, which have no ISI, are too well figures of all above, of pairs, or of TMS alone."""
-    meps, isis, digits = mep.numbers[known], isi.numbers[known], [_digits(mep, row) for row in known]
-    paired, slacks = np.isfinite(isis), np.maximum(0.51 * 10.0 ** -np.array(digits, dtype=float), 1e-9 * meps)
-    first = int(np.flatnonzero(paired).max(initial=-1)) + 1
-    for begin in range(max(first, len(meps) - _BELOW_AT_MOST, _SEVERAL), len(meps)):
-        above = meps[:begin]
-        kinds = [_figures(one) for one in (above, above[paired[:begin]], above[~paired[:begin]])]
-        of_each = [float(above[isis[:begin] == isi].mean()) for isi in np.unique(isis[paired])[:_BELOW_AT_MOST]]
-        usual, every = (np.concatenate([one[:most] for one in kinds]) for most in (_USUAL, None))
-        for figures in (kinds[0][:4], kinds[0][4:7], usual, every, np.array(of_each)):
+        for figures in _figures_of(meps[:begin], isis[:begin]):
             are_so = np.any(abs(figures[:, None] - meps) <= slacks, axis=0)
             by_chance = max(are_so[:begin].sum() - 2, 0.5) / begin  # two are the least and the largest
-            chance = float(np.prod(np.where(meps[begin:] > 2 * above.max(), _CHANCE, by_chance)))
-            if are_so[begin:].all() and chance * (_CHANCE if apart == known[begin] else 1.0) < _CHANCE:
-                raise mep.refused(known[begin], "seems to be a mean of rows above, or an SD", _BELOW_TRIALS)
+            chance = np.prod(np.where(meps[begin:] > 2 * meps[:begin].max(), _CHANCE, by_chance)[are_so[begin:]])
+            chance *= _CHANCE ** (int(below == begin) + int(finer))
+            if are_so[begin] and 2 * are_so[begin:].sum() > len(known) - begin and chance < _CHANCE:
+                raise mep.refused(known[begin], _IS_FIGURE, _BELOW_TRIALS)
+    said, most = (order, _BELOW_AT_MOST) if "order" in columns.of else (isi, _ALONE_AT_MOST * (len(known) > _SEVERAL))
+    bare = [n for n, row in enumerate(known) if not said.text(row) and columns.called_alone(row) is None]
+    if bare and len(known) - bare[0] == len(bare) <= most and not np.isfinite(isis[bare]).any():
+        numbered = f", and no number in the column {order.name!r}," if said is order else ", and all above have one,"
+        raise mep.refused(known[bare[0]], f"has no ISI{numbered} as a mean or a sum has", _BELOW_TRIALS)
+    for least, are_ends in ((1, digits == digits.max(initial=0)), (2, np.isnan(isis))):  # each of its own trials
+        spans = [*pairwise([-1, *np.flatnonzero(are_ends)])]
+        parts = ((_figures(meps[begin + 1 : end])[:_USUAL], end) for begin, end in spans)
+        agree = [(abs(figures - meps[end]) <= slacks[end]).any() for figures, end in parts]
+        if least <= len(spans) < len(known) / _ROWS_A_PART and np.mean(agree) > _SHARED:
+            raise mep.refused(known[spans[0][1]], _IS_FIGURE, _BELOW_TRIALS)
 
 
-def _digits(column: Column, row: int) -> int:
-    return len(column.texts[row].partition(column.decimal)[2])
-
-
-def _is_summary(number: float, digits: int, *groups: FloatArray) -> bool:
-    """True if a number is, as far as its digits say, a mean or median of others, their SD, or its standard error."""
-    slack = max(0.51 * 10.0**-digits, 1e-9 * abs(number))
-    return number not in groups[0] and any((abs(_figures(one)[:_USUAL] - number) <= slack).any() for one in groups)
+def _figures_of(meps: FloatArray, isis: FloatArray) -> Iterator[FloatArray]:
+    """What may stand together below trials: figures of all, of pairs and of TMS alone, or the means of each ISI."""
+    paired = np.isfinite(isis)
+    every, *_ = kinds = [_figures(one) for one in (meps, meps[paired], meps[~paired])]
+    yield np.concatenate([one[:_USUAL] for one in kinds])
+    if len(meps) >= _SEVERAL:
+        yield from (every[:4], every[4:7], np.concatenate(kinds))
+    yield np.array([float(meps[isis == isi].mean()) for isi in np.unique(isis[paired])[:_BELOW_AT_MOST]])
 
 
 def _figures(values: FloatArray) -> FloatArray:
@@ -214,10 +191,10 @@ def require_no_parts(columns: Columns, empty: Iterable[int]) -> None:
 def _require_ascending(columns: Columns) -> None:
     """Raise if rows are not in the order of delivery, on which drift and the start depend, or a block comes back."""
     block, seen = columns["block"], set[str]()
-    for text, rows in groupby(columns.rows if block.name not in columns.layout.where else (), block.text):
+    for text, rows in groupby(columns.rows, block.text):
         if text and text in seen:
-            remedy = f'If it tells muscles apart, say --where "{block.name}={text}", or --where "{block.name}={ALL}".'
-            raise block.refused(next(rows), "comes back after another block", remedy)
+            remedy = f'If it tells muscles apart, say --where "{block.name}={text}"; if all belong together'
+            block.doubt("comes back after another block", text, remedy, row=next(rows))
         seen.add(text)
     if (order := columns.of.get("order") or columns.of.get("date")) is None:
         return
@@ -250,18 +227,21 @@ def _require_said(columns: Columns) -> None:
         if (by := columns.called_alone(row)) is not None and not (by is condition and one_word):
             remedy = "If it is TMS alone, leave its ISI empty, or say --alone with it; if a pair, rename the column."
             raise by.refused(row, f"says TMS alone, and the ISI there is {isi.text(row)}", remedy)
+    once = [number for row in paired if (number := isi.number(row)) is not None]
+    if 2 * len(once) <= len(columns.rows) and len(once) > _FEW and once == sorted({*once}):  # as in the first row alone
+        remedy = "Write each row's own; if it is TMS alone, write that there, or number all in a column called trial."
+        bare = next((row for row in columns.rows if not isi.text(row) and "order" not in columns.of), None)
+        if bare is not None and columns.called_alone(bare) is None:
+            raise isi.refused(bare, "is empty, as if the ISI above held for it, too", remedy)
     of_alone = {isi.text(row) for row in {*columns.rows} - {*paired}} - {""}
     unsaid = [row for row in paired if not condition.text(row) and isi.text(row) in of_alone]
     if unsaid and condition.name:  # such as a word that stands in the first row of each block alone
-        remedy = (
-            f"Write into each row what it is; if all rows with it are TMS alone, say --alone {isi.text(unsaid[0])}."
-        )
+        remedy = f"Write into each row what it is; if all with it are TMS alone, say --alone {isi.text(unsaid[0])}."
         raise condition.refused(unsaid[0], "is empty, and the ISI there is that of TMS alone", remedy)
     flags, lost = columns[columns.flags], sum(columns.lost(row) is not None for row in columns.rows)
-    if len(columns.rows) >= _SEVERAL and 2 * lost > len(columns.rows) and flags.name not in columns.layout.where:
+    if len(columns.rows) >= _SEVERAL and 2 * lost > len(columns.rows):
         remedy = f'If yes leaves a trial out, say --column "exclude={flags.name}"; if no does, --column '
-        remedy += f'"status={flags.name}"; if it is so, --where "{flags.name}={ALL}", too.'
-        raise flags.doubted("leaves out most trials", f"{lost} of {len(columns.rows)}", remedy)
+        flags.doubt("leaves out most trials", f"{lost} of {len(columns.rows)}", f'{remedy}"status={flags.name}"; if so')
     said = [columns["status"].flag(row) for row in columns.rows if "status" in columns.of]
     if {*said} == {None, True}:
         row = columns.rows[said.index(None)]
@@ -281,24 +261,21 @@ def _require_one_kind(columns: Columns) -> None:
     isi = columns["isi"]
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
     for name, column in columns.beside.items() if by_isi else ():
-        if name in columns.layout.where:
-            continue
         texts = {row: column.text(row).casefold() for _, row in by_isi}
         alone = [row for row, text in texts.items() if " " in plain(text) and plain(text) in WORDS["alone"]]
         if alone and len({*texts.values()}) > 1:
-            remedy = f'Say --column "condition={name}"; if these are pairs, say --where "{name}={ALL}".'
-            raise column.refused(alone[0], "says TMS alone, and nothing is read of it", remedy)
+            remedy = f'Say --column "condition={name}"; if these are pairs'
+            column.doubt("says TMS alone, and nothing is read of it", None, remedy, row=alone[0])
         said = np.array([texts[row] in WORDS["yes"] for _, row in by_isi])
         if {*texts.values()} <= {"", *WORDS["yes"], *WORDS["no"]} and _are_flags(said, by_isi):
             remedy = f'If yes leaves a trial out, say --column "exclude={name}"; if no does, --column "status={name}"; '
-            remedy += f'if all are to be analysed together, --where "{name}={ALL}".'
-            raise column.doubted("says yes or no of each pair, and nothing is read of it", None, remedy)
+            remedy += "if all are to be analysed together"
+            column.doubt("says yes or no of each pair, and nothing is read of it", None, remedy)
         if kinds := kinds_at_each(by_isi, column):
             few = ", ".join(kinds[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
-            remedy = f'Say --where "{name}={kinds[0]}" for one of them, --where "{name}={ALL}" if all are to '
-            remedy += f'be analysed together, or --column "subject={name}" if they are people; if one is TMS alone, '
-            remedy += "write that in place of its ISIs."
-            raise column.doubted("has several values at each ISI, and nothing is read of it", few, remedy)
+            remedy = f'Say --where "{name}={kinds[0]}" for one of them, or --column "subject={name}" if they are '
+            remedy += "people; if one is TMS alone, write that in place of its ISIs; if all are to be analysed together"
+            column.doubt("has several values at each ISI, and nothing is read of it", few, remedy)
 
 
 def _require_no_remarks(columns: Columns) -> None:
@@ -312,9 +289,9 @@ def _require_no_remarks(columns: Columns) -> None:
         is_other |= usual in remarks or bool(_NUMBER.fullmatch(usual)) or told == rows[:1] or 2 * len(told) > len(rows)
         if is_other:  # it is of all trials, or tells kinds apart
             told = [row for row in told if is_verdict(column.text(row))]
-        if told and column.name not in columns.layout.where:
-            remedy = f'Mark such rows in a column called exclude; if they count, say --where "{column.name}={ALL}".'
-            raise column.refused(told[0], "may say that the trial does not count", remedy)
+        if told:
+            remedy = "Mark such rows in a column called exclude; if they count"
+            column.doubt("may say that the trial does not count", None, remedy, row=told[0])
 
 
 def _seldom_states(by_isi: Sequence[tuple[float, int]], column: Column) -> list[str]:
@@ -327,9 +304,8 @@ def _seldom_states(by_isi: Sequence[tuple[float, int]], column: Column) -> list[
     said = np.array(texts) == min(times, key=lambda text: times[text])
     isis_ms = np.array([isi_ms for isi_ms, _ in by_isi])
     shared = np.isin(isis_ms[~said], isis_ms[said]).any() or np.unique(isis_ms).size == isis_ms.size
-    has_isis = np.unique(isis_ms[said]).size > 1 or (
-        shared and min(times.values()) < _FEW <= len(texts) / 4
-    )  # or it stands for one
+    has_isis = np.unique(isis_ms[said]).size > 1  # or it stands for one
+    has_isis |= bool(shared and min(times.values()) < _FEW <= len(texts) / 4)
     return [*times] if has_isis and _are_flags(said, by_isi) and not _counts_again(column, by_isi) else []
 
 
@@ -374,10 +350,10 @@ def _counts_again(column: Column, by_isi: Sequence[tuple[float, int]]) -> bool:
 def _require_one_intensity(columns: Columns) -> None:
     """Raise if TMS alone had other intensities than pairs by a column that is not used, so that it is no baseline."""
     for name, column in columns.beside.items():
-        rows = columns.rows if name not in columns.layout.where and _INTENSITY.search(words_of(name)) else ()
+        rows = columns.rows if _INTENSITY.search(words_of(name)) else ()
         of_pairs = {text: None for row in columns.paired if rows and (text := column.text(row))}
         others = dict.fromkeys(text for row in rows if (text := column.text(row)) not in {"", *of_pairs})
         if of_pairs and others:
             remedy = f'Say --where "{name}={next(iter(of_pairs))}", or name a column in % of the resting motor '
-            remedy += f'threshold by --column intensity=NAME; to analyse all, say --where "{name}={ALL}".'
-            raise column.doubted("says other intensities of TMS alone than of pairs", ", ".join([*others][:5]), remedy)
+            remedy += "threshold by --column intensity=NAME; to analyse all"
+            column.doubt("says other intensities of TMS alone than of pairs", ", ".join([*others][:5]), remedy)

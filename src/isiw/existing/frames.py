@@ -46,7 +46,7 @@ def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
         return _labelled(path, STATISTICS[suffix])
     if suffix == ".parquet":
         return named(pd.read_parquet(io.BytesIO(content_of(path))))
-    return _workbook(content_of(path), layout) if suffix in WORKBOOKS else _texts(text_of_file(path), layout)
+    return _workbook(content_of(path), layout) if suffix in WORKBOOKS else _texts(decoded(content_of(path)), layout)
 
 
 def content_of(path: Path) -> bytes:
@@ -195,14 +195,12 @@ def _without_foot(rows: list[list[Any]]) -> tuple[list[list[Any]], str]:
     """Rows without lines of text below them, and these lines."""
     kept, foot = len(rows), ""
     for row in reversed(rows):
-        if len(said := [cell for cell in row if not is_missing(cell)]) > 1 or not all(map(_is_line, said)):
+        said = [cell for cell in row if not is_missing(cell)]
+        are_lines = all(isinstance(cell, str) and (cell.count(" ") >= _WORDS or ": " in cell) for cell in said)
+        if not are_lines:
             break
         kept, foot = kept - 1, "\n".join([*said, foot])
     return (rows[:kept], f"\n{foot}") if foot.strip() else (rows, "")
-
-
-def _is_line(cell: Any) -> bool:
-    return isinstance(cell, str) and (cell.count(" ") >= _WORDS or ": " in cell)
 
 
 def _unit_below(cell: str) -> str | None:
@@ -211,11 +209,6 @@ def _unit_below(cell: str) -> str | None:
         return f"({unit})"
     inside = re.fullmatch(r"[^\W\d]+ ?[\[(]([^][()]*)[\])]", cell.strip())
     return cell.strip() if inside and unit_named(inside[1]) else None
-
-
-def text_of_file(path: Path) -> str:
-    """The text in a file."""
-    return decoded(content_of(path))
 
 
 def decoded(content: bytes) -> str:
@@ -330,11 +323,8 @@ def _require_whole(book: Any, sheet: str, head: int) -> tuple[list[str], list[in
     with book[sheet]._get_source() as file:  # noqa: SLF001 - openpyxl does not read it in another way, row by row
         content = file.read()
     notes = (book._archive.read(name) for name in book._archive.namelist() if "comment" in name)  # noqa: SLF001 - the same
-    said = [
-        (row, "".join(_TEXT.findall(note.decode())).rpartition(":\n")[2])
-        for row, note in _NOTE.findall(b"".join(notes))
-    ]
-    left_out = "|".join(row.decode() for row, note in said if is_remark(note))
+    said = ((row, "".join(_TEXT.findall(note.decode()))) for row, note in _NOTE.findall(b"".join(notes)))
+    left_out = "|".join(row.decode() for row, note in said if is_remark(note.rpartition(":\n")[2]))
     crossed, coloured = _styled(book, lambda font, _: font.strike), _styled(book, _is_coloured)
     noted = rf'<row [^>]*?r="({left_out})"' if left_out else "(?!)"
     for pattern, are, remedy in (

@@ -120,11 +120,6 @@ def joined(events: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     return events.assign(name=names, called=events["name"])
 
 
-def _once(times_s: FloatArray) -> FloatArray:
-    """Times of a trigger, of which those found twice are one."""
-    return times_s[np.diff(times_s, prepend=-np.inf) > _TWICE_S]
-
-
 def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> list[Pulse]:
     """All pulses, each with the tap, or the valve command, that it belongs to."""
     found = {one: _marker(events, one, layout, source) for one in ("pulse", key, "alone", *layout.markers)}
@@ -138,7 +133,8 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
     if origin_name == pulse_name:
         what = f"one event of {source} cannot mark both stimuli"
         raise InvalidValueError(what, got=pulse_name, remedy=f"Say --marker {key}=NAME.")
-    at_s, origins_s = (_once(times_of(events, name)) for name in (pulse_name, origin_name))
+    every = (times_of(events, name) for name in (pulse_name, origin_name))
+    at_s, origins_s = (times_s[np.diff(times_s, prepend=-np.inf) > _TWICE_S] for times_s in every)  # each once
     alone_s = times_of(events, None if alone_name in {pulse_name, origin_name} else alone_name)
     more_s = [at for at in alone_s.tolist() if not np.any(np.abs(at_s - at) <= _SAME_PULSE_S)]
     epochs = events[events["name"].astype(str) == "sweep"]
@@ -176,7 +172,8 @@ def _require_named_isis(pulses: Sequence[Pulse], events: pd.DataFrame, layout: L
         rows = [{str(key): cell for key, cell in row.items()}
                 for _, row in events[np.abs(times_s - pulse.at_s) < _TWICE_S].iterrows()]  # fmt: skip
         texts = [*before, *(str(row.get("called", row["name"])) for row in rows)]
-        said_ms = {_ms_of(found): found[0].strip() for text in texts if (found := _ISI.search(text))}
+        said_ms = {float(found[1].replace(",", ".")) * ISI_UNITS_MS[(found[2] or "ms").casefold()]: found[0].strip()
+                   for text in texts if (found := _ISI.search(text))}  # fmt: skip
         said_ms |= {isi_ms: f"ISI {isi_ms:g}" for row in rows for isi_ms in isis_of(row)}
         if pulse.isi_s is not None and len(said_ms) == 1:
             ((isi_ms, text),) = said_ms.items()
@@ -190,10 +187,6 @@ def _require_named_isis(pulses: Sequence[Pulse], events: pd.DataFrame, layout: L
             what = f"an event of {source} names another ISI than the one between its tap and its pulse"
             remedy = f'Correct the events; if their names are wrong, say --where "{EVENT}={ALL}".'
             raise InvalidValueError(what, got=name, expected=f"{ms - usual_ms:+.0f} ms", remedy=remedy)
-
-
-def _ms_of(found: re.Match[str]) -> float:
-    return float(found[1].replace(",", ".")) * ISI_UNITS_MS[(found[2] or "ms").casefold()]
 
 
 def _before(pulses: Sequence[Pulse], events: pd.DataFrame, layout: Layout) -> list[dict[str, float]]:

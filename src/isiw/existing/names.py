@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from typing import TYPE_CHECKING, Final
 
@@ -37,7 +36,7 @@ RELATIVE: Final = (
     r"\bmep\b.*\bmep\b|\bindex\b(?! ?finger)"
 )
 WHOLE: Final = r"peak\W*(to|2)?\W*peak|\bp\W?(2|to|t)?\W?p\b|max\w*\W+(to\W+)?min"  # from peak to peak
-_HALVES: Final = r"\b(bas[ei]|zero|0|onset|null)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b"
+_HALVES: Final = r"\b(bas[ei]|zero|0|onset|null|neg|pos)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b"
 _MEASURES: Final = (
     rf"{_HALVES}|\b[aá]rea\b|\baire\b|fläche|\bauc\b|\brms\d*\b|tkeo|teager|\babs\b|\benv\b|integra|\biemg\b|rectif|\brect\b(?!\W*(fem|abd))|gleichger|"
     r"\b(envelope|arv|mav|turns|power|energy|snr|counts|adc|adu|lsb)\b|"
@@ -106,7 +105,7 @@ _LISTED: Final = re.compile(
     rf"\b{_LEFT_OUT}\b\W*((in|of|trials?|sweeps?|frames?|stimul\w+|nr|no|versuche?|essais?)\b\W*)*{_NUMBER}|"
     rf"\b(trials?|sweeps?|versuche?|nr|essais?)\W+{_NUMBER}(\W+(and |und |et )?\d+)*\W+(\w+\W+){{0,2}}{_LEFT_OUT}\b"
 )  # numbers of trials that do not count
-_OF_GAIN: Final = 'Divide the amplitudes by it; if they are those at the electrodes already, say --where "{}=*".'
+_OF_GAIN: Final = "Divide the amplitudes by it; if they are those at the electrodes already"
 _HARMLESS: Final = WORDS["harmless"] | WORDS["counted"]
 _DENIED: Final = WORDS["left out"] | WORDS["flags"] | WORDS["deniable"] | WORDS["no"]
 _CLAUSES: Final = re.compile(r"[\n;]|[.,](?=\s)")
@@ -149,8 +148,7 @@ def require_order(isi: Column) -> None:
     """Raise if the name of ISIs says that they count from a trigger, of whatever, or from the pulse to the tap."""
     for pattern, says in _ORDERS.items():
         if found := re.search(pattern, words_of(isi.name)):
-            remedy = f'If they count from the event that is stated, and it came first, say --where "{isi.name}={ALL}".'
-            raise isi.doubted(says, found[0], remedy)
+            isi.doubt(says, found[0], "If they count from the event that is stated, and it came first")
 
 
 def require_title(title: str, mep: Column, reference: Reference | None, notes: str = "") -> None:
@@ -158,45 +156,37 @@ def require_title(title: str, mep: Column, reference: Reference | None, notes: s
 
     Of notes elsewhere, as on other sheets, it must say nothing of trials that do not count, and no gain.
     """
-    remedy = f'If not, correct the title, or the name of the file or sheet, or say --where "{mep.name}={ALL}".'
-    said, every = words_of(title), words_of(f"{title}\n{notes}")
-    if (found := _LISTED.search(" ".join(every.split()))) is not None:
-        what = f"a line of {mep.of} beside the table says which trials do not count"
-        left_out = "Mark them in a column called exclude, and remove that line; if they are left out already, say "
-        raise InvalidValueError(what, got=found[0], remedy=f'{left_out}--where "{mep.name}={ALL}".')
-    if (found := _A_GAIN.search(every)) is not None and not _AT_ELECTRODES.search(every):
-        raise mep.doubted("stands below a title that says a gain", found[0], _OF_GAIN.format(mep.name))
-    for clause in (" ".join(each.split()) for each in _CLAUSES.split(said)):
-        origin = rf"{_AFTER} (the )?(\w+ ){{0,2}}?({_ORIGINS[reference]})" if reference is not None else "(?!)"
+    every = words_of(f"{title}\n{notes}")
+    if found := _LISTED.search(" ".join(every.split())):
+        remedy = "Mark them in a column called exclude, and remove that line; if they are left out already"
+        mep.doubt("stands beside a line that says which trials do not count", found[0], remedy)
+    if (found := _A_GAIN.search(every)) and not _AT_ELECTRODES.search(every):
+        mep.doubt("stands below a title that says a gain", found[0], _OF_GAIN)
+    origin = "(?!)" if reference is None else rf"{_AFTER} (the )?(\w+ ){{0,2}}?({_ORIGINS[reference]})"
+    for clause in (" ".join(each.split()) for each in _CLAUSES.split(words_of(title))):
         if found := re.search(origin, clause):
-            remedy = remedy.replace("If not", "If it is wrong") + " Or correct --reference."
-            raise mep.doubted("stands below a title that counts ISIs from another event", reference, remedy, found[0])
+            why, remedy = "counts ISIs from another event", "Correct the title, or --reference; if both are right"
+            mep.doubt(f"stands below a title that {why}", reference, remedy, found[0])
         is_of_meps = _OF_AMPLITUDES.search(clause) and not _OF_INTENSITY.search(clause)
         for pattern, seems in (_ANY_TITLES | (_TITLES if is_of_meps else {})).items():
             if found := re.search(pattern, clause):
-                raise mep.doubted(f"seems {seems} by what the title says", found[0], remedy)
+                remedy = "Correct the title, or the name of the file or sheet; if they are as they were measured"
+                mep.doubt(f"seems {seems} by what the title says", found[0], remedy)
 
 
-def require_no_gain(columns: Iterable[Column], where: Mapping[str, str]) -> None:
-    """Raise if a column of which nothing is read has an amplifier's gain."""
-    for column in columns:
-        odd = [text for text in column.texts if text not in {"", "0", "1"}]
-        if odd and column.name not in where and re.search(_GAIN, words_of(column.name)):
-            raise column.doubted("has a gain, and nothing is read of it", odd[0], _OF_GAIN.format(column.name))
-
-
-def require_no_flags(beside: Iterable[Column], where: Mapping[str, str]) -> None:
-    """Raise if a column of which nothing is read has flags, by its name or by words of what counts."""
-    for column in beside:
-        texts = [*map(str.casefold, column.texts)] if column.name not in where else []
-        key = key_of_flags(column.name) or ("exclude" if WORDS["counted"] & {*texts} else None)
-        texts = texts if key else []
-        kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
-        odd = [row for row, text in enumerate(texts) if text in kinds]
-        are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
-        if are_flags and 0 < len(odd) < len(texts):
-            remedy = f'Say --column "{key}={column.name}"; if such trials count, say --where "{column.name}={ALL}".'
-            raise column.refused(odd[0], "says that the trial does not count, and nothing is read of it", remedy)
+def require_no_flags(column: Column) -> None:
+    """Raise if a column of which nothing is read has flags, by its name or by words of what counts, or a gain."""
+    gains = [text for text in column.texts if text not in {"", "0", "1"}]
+    if gains and re.search(_GAIN, words_of(column.name)):
+        column.doubt("has a gain, and nothing is read of it", gains[0], _OF_GAIN)
+    texts = [*map(str.casefold, column.texts)]
+    key = key_of_flags(column.name) or ("exclude" if WORDS["counted"] & {*texts} else None)
+    kinds = {"exclude": WORDS["yes"], "status": WORDS["no"] | {""}}.get(key or "", WORDS["no"]) | WORDS["left out"]
+    odd = [row for row, text in enumerate(texts) if text in kinds]
+    are_flags = {*texts} <= {"", *WORDS["yes"], *WORDS["no"], *WORDS["counted"], *WORDS["left out"]}
+    if key and are_flags and 0 < len(odd) < len(texts):
+        remedy = f'Say --column "{key}={column.name}"; if such trials count'
+        column.doubt("says that the trial does not count, and nothing is read of it", None, remedy, row=odd[0])
 
 
 def says_only(text: str, known: AbstractSet[str]) -> bool:

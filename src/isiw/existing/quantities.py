@@ -16,7 +16,6 @@ from isiw.existing.names import (
     ALL,
     RELATIVE,
     require_no_flags,
-    require_no_gain,
     require_of_kind,
     require_order,
     require_reference,
@@ -97,18 +96,20 @@ class Columns:
         names = [str(name) for name in frame.columns]
         held = {key: _named(key, names, layout, source) for key in COLUMNS if key != "mep" or key in needed}
         _require_held([key for key in needed if held[key] is None], frame, source)
-        columns, of_units = dict[str, Column](), set[str]()
+        every = [Column(name, frame.iloc[:, place].tolist(), of=source) for place, name in enumerate(names)]
+        columns, used = dict[str, Column](), {*held.values()}
         for key, name in held.items():
             if name is not None:
                 units = units_beside(key, name, frame) or _units_above(key, name, frame)
-                said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
-                columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
+                said, cells = without_unit_in_cells(name, every[names.index(name)].cells)
+                said = "".join([said, *(f" ({unit})" for unit in units.values())])
+                columns[key] = Column(said, cells, of=source, is_stated=said in layout.where)
                 columns[key].require_no_errors()
-                of_units |= units.keys()
+                used |= units.keys()
         columns, stated = _scaled(columns, layout)
         columns |= _with_taps_alone(replace(columns["isi"], remedy=_OF_ISIS), columns.get("tap_alone"))
         for key in [key for key in columns if key not in layout.columns and _is_another(key, columns)]:
-            held[key] = None
+            used.remove(held[key])
             del columns[key]
         if "subject" in columns:
             columns["subject"] = replace(columns["subject"], of_codes=True)
@@ -117,20 +118,18 @@ class Columns:
             columns["status"] = replace(columns["status"], cells=cells)
         if "mep" in columns:
             columns["mep"] = replace(columns["mep"], remedy=_OF_MEPS)
-            doubts.require_single_trials(columns["mep"], columns["isi"], frame, layout)
-        used = {*held.values(), *of_units}
-        cells_of = {name if name.strip() else f"column {place + 1}": frame.iloc[:, place].tolist()
-                    for place, name in enumerate(names) if name not in used}  # fmt: skip
-        beside = {name: Column(name, cells, of=source) for name, cells in cells_of.items()
-                  if name in names or not all(map(is_missing, cells))}  # fmt: skip
-        require_no_flags(beside.values(), layout.where)
-        require_no_gain(beside.values(), layout.where)
+            others = [one for one in every if one.name != held["mep"]]
+            doubts.require_single_trials(columns["mep"], columns["isi"], others, frame, layout.reference)
+        free = [(one.name if one.name.strip() else f"column {place}", one) for place, one in enumerate(every, 1)
+                if one.name not in used and (one.name.strip() or any(one.texts))]  # fmt: skip
+        beside = {name: replace(one, name=name, is_stated=name in layout.where) for name, one in free}
+        for column in beside.values():
+            require_no_flags(column)
         require_reference("column", "isi", columns["isi"].name, layout.reference, source)
-        if columns["isi"].name not in layout.where:
-            require_order(columns["isi"])
+        require_order(columns["isi"])
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = WORDS["alone"] | WORDS["tap alone"]
-            of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
+            of_pairs = replace(condition, cells=["" if plain(text) in alone else text for text in condition.texts])
             if len({*map(plain, of_pairs.texts)} - {""}) > 1:
                 beside[condition.name] = of_pairs
         empty = Column("", [None] * len(frame), of=source)
@@ -265,9 +264,8 @@ def unit_of(name: str, frame: pd.DataFrame) -> str:
 def _units_above(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
     """The unit that a title says of ISIs or amplitudes, such as "MEP in µV", or "in s" if no column's name does."""
     known = {"isi": {**ISI_UNITS_MS, "samples": 1.0}, "mep": EMG_UNITS}.get(key, {})
-    said = re.findall(
-        r"(?i)([^\W\d_]+?)s?(?: are| is| sind| ist)? in ([^\W\d_]+)", f" - {frame.attrs.get('title', '')}"
-    )
+    title = f" - {frame.attrs.get('title', '')}"
+    said = re.findall(r"(?i)([^\W\d_]+?)s?(?: are| is| sind| ist)? in ([^\W\d_]+)", title)
     found = [unit for of, word in said if (unit := unit_named(word)) in known
              and (letters(of) in COLUMNS[key] or not unit_said(name, known))]  # fmt: skip
     return {"": str(found[0])} if found else {}

@@ -145,11 +145,10 @@ def _require_use(layout: Layout, used: Mapping[str, AbstractSet[str] | None], so
 def _in_memory(source: Any) -> Contents:
     if isinstance(source, pd.DataFrame):
         return Contents("the table", trials=source)
-    if hasattr(source, "metadata") and hasattr(source, "get_data"):
-        return mne_files.of_epochs(source)
-    if hasattr(source, "annotations"):
-        return mne_files.of_raw(source)
-    raise InvalidValueError("this holds no trials", got=source, expected="a path, a DataFrame, or mne.Epochs or Raw")
+    if not hasattr(source, "annotations"):
+        expected = "a path, a DataFrame, or mne.Epochs or Raw"
+        raise InvalidValueError("this holds no trials", got=source, expected=expected)
+    return mne_files.of_epochs(source) if hasattr(source, "metadata") else mne_files.of_raw(source)
 
 
 def _people_of(

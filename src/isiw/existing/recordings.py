@@ -111,6 +111,12 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     )
 
 
+def _note_of_the_cut_off(trials: Sequence[Trial]) -> list[str]:
+    cut = sum(trial.reason is Kind.MISSING_CHANNEL for trial in trials)
+    said = f"{counted(cut, 'pulse')} of {len(trials)} came where no EMG was recorded up to the end of the MEP."
+    return [said] if cut else []
+
+
 def _require_noise(trials: Sequence[Trial], emg: str, contents: Contents, layout: Layout) -> None:
     """Raise if EMG whose unit nothing says has less noise than an amplifier in the usual one."""
     rests_uv = [trial.background_rms_uv or np.inf for trial in trials]
@@ -189,11 +195,8 @@ def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[st
     events = joined(events, layout)
     emg = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
     unit, noted = _unit_of(emg, contents, layout)
-    return (
-        replace(contents, events=events, notes=(*notes, *noted)),
-        {**tracks, "emg": emg.scaled(EMG_UNITS[unit])},
-        unit,
-    )
+    contents = replace(contents, events=events, notes=(*notes, *noted))
+    return contents, {**tracks, "emg": emg.scaled(EMG_UNITS[unit])}, unit
 
 
 def _unit_of(emg: Track, contents: Contents, layout: Layout) -> tuple[str, tuple[str, ...]]:
@@ -201,25 +204,14 @@ def _unit_of(emg: Track, contents: Contents, layout: Layout) -> tuple[str, tuple
     what, known = f"the channel {emg.name!r} of {contents.source}", unit_named(emg.unit)
     unit = required_unit(layout, EMG_UNITS, known, what, emg.unit or None)
     named = {unit_named(word) for word in re.split(r"[\s,]+", emg.unit)} & EMG_UNITS.keys()  # such as in two places
-    if (
-        known == unit
-        or is_missing(emg.unit)
-        or (len(named) > 1 and known is None)
-        or emg.unit.strip().casefold() in WORDS["unknown"]
-    ):
+    is_unknown = is_missing(emg.unit) or emg.unit.strip().casefold() in WORDS["unknown"]
+    if known == unit or is_unknown or (len(named) > 1 and known is None):
         return unit, ()
     if not contents.unit_is_usual and emg.name not in layout.where:
         what += " says another unit than the one that is stated"
         remedy = f'Leave --unit out; if the file is wrong, say --where "{emg.name}={ALL}", too.'
         raise InvalidValueError(what, got=unit, expected=emg.unit, remedy=remedy)
     return unit, (f"{contents.source} says {emg.unit}, and {unit} is used, as stated.",)
-
-
-def _note_of_the_cut_off(trials: Sequence[Trial]) -> tuple[str, ...]:
-    """A sentence about pulses without EMG, if there are any."""
-    cut = sum(trial.reason is Kind.MISSING_CHANNEL for trial in trials)
-    said = f"{counted(cut, 'pulse')} of {len(trials)} came where no EMG was recorded up to the end of the MEP."
-    return (said,) if cut else ()
 
 
 def _with_the_cut_off(pulses: list[Pulse], tapped: Track, layout: Layout) -> list[Pulse]:

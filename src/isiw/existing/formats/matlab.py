@@ -111,16 +111,14 @@ def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
             yield (name,), np.asarray(value)
 
 
-def _filled(array: Any) -> Any:
-    """An array whose empty cells are empty texts, if it has texts."""
-    if array.ndim == 1 and any(isinstance(one, str) for one in array):
-        return np.array([one if np.size(one) else "" for one in array], dtype=object)
-    return array
-
-
 def _vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
     """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
-    squeezed = {name: _filled(array.squeeze()) if array.size > 1 else array for name, array in arrays.items()}
+    squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
+    squeezed |= {
+        name: np.array([one if np.size(one) else "" for one in array], dtype=object)  # of empty cells
+        for name, array in squeezed.items()
+        if array.ndim == 1 and any(isinstance(one, str) for one in array)
+    }
     vectors = {name: array for name, array in squeezed.items()  # but not a cell's arrays, such as one for each ISI
                if array.ndim == 1 and not any(isinstance(one, np.ndarray) for one in array)}  # fmt: skip
     texts = {name: str(array.item()) for name, array in arrays.items() if array.size == 1 and array.dtype.kind in "UO"}

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, timed, with_codes
-from isiw.existing.frames import text_of_file
+from isiw.existing.frames import content_of, decoded
 from isiw.existing.layout import Layout
 from isiw.text.named_code import library
 
@@ -31,9 +31,9 @@ def read(path: Path, _layout: Layout) -> Contents:
 
 def _require_whole_markers(path: Path) -> None:
     """Raise if a comma in the text of a marker is not coded, which MNE takes for the end of the text."""
-    said = re.search(r"^MarkerFile=(.*)$", text_of_file(path), re.MULTILINE)
+    said = re.search(r"^MarkerFile=(.*)$", decoded(content_of(path)), re.MULTILINE)
     markers = path.parent / (said[1].strip().replace("$b", path.stem) if said else path.name)
-    for line in text_of_file(markers).splitlines() if markers.is_file() else ():
+    for line in decoded(content_of(markers)).splitlines() if markers.is_file() else ():
         kind, *fields = line.partition("=")[2].split(",")  # of these: text, place, size, channel, and perhaps a date
         is_date = kind != "Comment" or len(fields[-1].strip()) >= _DATE
         dated = len(fields) == 5 and fields[1].strip().isdigit() and is_date

@@ -56,8 +56,8 @@ def _channels(series: Any, held: Any) -> Iterator[Track]:
     of_each = getattr(series, "channel_conversion", None)
     for channel in range(max(1, count)):
         factor = float(series.conversion or 1.0) * (1.0 if of_each is None else float(of_each[channel]))
-        name, part = series.name, partial(_part, series, held, channel if count else None)
-        name, kind = name if count < 2 else f"{name} {channel + 1}", "emg" if "emg" in name.casefold() else ""
+        name, kind = f"{series.name} {channel + 1}", "emg" if "emg" in series.name.casefold() else ""
+        name, part = name if count > 1 else series.name, partial(_part, series, held, channel if count else None)
         track = Track(name, rate_hz, stretches, part, str(series.unit or ""), kind)
         yield track.scaled(factor, float(series.offset or 0.0))
 

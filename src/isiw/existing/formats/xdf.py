@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import gzip
 import io
-import re
+import mmap
 import struct
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree as ET
@@ -28,14 +28,18 @@ from isiw.types import FloatArray, IntArray
 BOUNDARY: Final = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
 _HEADER, _SAMPLES, _FOOTER = 2, 3, 6
 _LATE_S: Final = 1e-3
-_MOST: Final = 2**31  # a chunk that is longer [bytes] is damaged
 _OF_MARKERS: Final = ("marker", "trig", "ttl", "stim", "event")
 
 
 def read(path: Path, _layout: Layout) -> Contents:
     """The channels and markers of all streams, on one clock; gaps are found here, since pyxdf smooths them away."""
+    with opened(path) as file:
+        is_packed = path.suffix.casefold() == ".xdfz"
+        whole: Any = gzip.decompress(file.read()) if is_packed else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    if whole[:4] != b"XDF:":
+        raise ValueError("it does not begin as XDF does")
     load, held = library("pyxdf", "import").load_xdf, dict[int, _Stream]()
-    found, _ = load(io.BytesIO(b"XDF:" + b"".join(_shortened(path, held))), dejitter_timestamps=False, verbose=False)
+    found, _ = load(io.BytesIO(b"XDF:" + b"".join(_shortened(whole, held))), dejitter_timestamps=False, verbose=False)
     streams = [(own, one) for one in found  # of fewer rows of numbers nobody knows the rate
                if len(one["time_stamps"]) > 2 * (own := held[one["info"]["stream_id"]]).has_numbers]  # fmt: skip
     begun_s = min((float(stream["time_stamps"][0]) for _, stream in streams), default=0.0)
@@ -46,8 +50,7 @@ def read(path: Path, _layout: Layout) -> Contents:
         if several and not len(stream["clock_times"]):
             notes.append(f"The stream {own.name} has no clock offsets, and another computer recorded beside it.")
         if own.has_numbers:
-            kept = np.concatenate(own.chunks)[: len(times_s)]  # of which pyxdf left out what came after the end
-            own.rows = np.ascontiguousarray(kept.T)
+            own.rows = np.ascontiguousarray(np.concatenate(own.chunks).T)
             what, samples = f"the stream {own.name}", int(own.rows[1, -1])
             rate_hz, stretches, said = clocked(times_s, own.rate_hz, what, own.rows[0], samples)
             notes += said
@@ -62,9 +65,9 @@ def read(path: Path, _layout: Layout) -> Contents:
 class _Stream:
     """A stream by its header, and where in the file its samples are if they are numbers at a rate."""
 
-    def __init__(self, path: Path, header: bytes) -> None:
+    def __init__(self, whole: Any, header: bytes) -> None:
         said = ET.fromstring(header.decode("utf-8", "replace"))  # noqa: S314 - as pyxdf does; see apart.py
-        self.path, self.said, self.name = path, said, said.findtext("name") or ""
+        self.whole, self.said, self.name = whole, said, said.findtext("name") or ""
         self.form, self.kind = (said.findtext(key, "").strip().casefold() for key in ("channel_format", "type"))
         self.count, self.rate_hz = int(said.findtext("channel_count", "")), float(said.findtext("nominal_srate") or 0.0)
         self.has_numbers = self.rate_hz > 0 and self.form != "string"
@@ -103,61 +106,42 @@ class _Stream:
         self.last_s, self.samples = at_s, self.samples + len(places)
         return content[:4] + b"\x08" + len(kept).to_bytes(8, "little") + b"".join(kept)
 
-    def ended(self, content: bytes) -> bytes:
-        """The footer, by what pyxdf gets: it leaves out samples beyond those that the stream had."""
-        rows = sum(map(len, self.chunks))
-        return re.sub(rb"(?<=<sample_count>)\d+", lambda n: b"%d" % (rows - max(0, self.samples - int(n[0]))), content)
-
     def read(self, channel: int, first: int, last: int) -> FloatArray:
         """The numbers of a channel from one sample to before another."""
         found, (begins, ends, *_) = [np.empty(0)], self.rows
-        span = slice(np.searchsorted(ends, first, "right"), np.searchsorted(begins, last))
-        with _opened(self.path) as file:
-            for begin, end, place, step in self.rows[:, span].T.tolist():
-                count = min(end, last) - max(begin, first)
-                file.seek(place + max(0, first - begin) * step + channel * self.type.itemsize)
-                raw = file.read((count - 1) * step + self.type.itemsize)
-                found.append(np.ndarray(count, self.type, raw, strides=step).astype(np.float64))
+        for begin, end, place, step in self.rows[:, (ends > first) & (begins < last)].T.tolist():
+            count, at = min(end, last) - max(begin, first), place + max(0, first - begin) * step
+            values = np.ndarray(count, self.type, self.whole, at + channel * self.type.itemsize, step)
+            found.append(values.astype(np.float64))
         return np.concatenate(found)
 
 
-def _shortened(path: Path, held: dict[int, _Stream]) -> Iterator[bytes]:
-    """The chunks of a file with the first of numbers in a row; its streams are gathered."""
-    for at, tag, content in _chunks(path):
+def _shortened(whole: Any, held: dict[int, _Stream]) -> Iterator[bytes]:
+    """The chunks of a file with the first of numbers in a row; its streams are gathered, a damaged chunk is left out.
+
+    Of a stream of numbers the footer is, too, by whose count of samples pyxdf would cut off what is shortened.
+    """
+    for at, tag, content in _chunks(whole):
         stream, kept = int.from_bytes(content[:4], "little"), content
         with suppress(ET.ParseError, IndexError, struct.error):  # pyxdf makes of a header what it can
             if tag == _HEADER:
-                held[stream] = _Stream(path, content[4:])
+                held[stream] = _Stream(whole, content[4:])
             elif stream in held and held[stream].has_numbers and tag in {_SAMPLES, _FOOTER}:
-                kept = b""  # a damaged chunk is left out
-                kept = held[stream].shortened(at, content) if tag == _SAMPLES else held[stream].ended(content)
+                kept = b""
+                kept = held[stream].shortened(at, content) if tag == _SAMPLES else b""
         if kept:
             yield b"\x08" + (len(kept) + 2).to_bytes(8, "little") + tag.to_bytes(2, "little") + kept
 
 
-def _chunks(path: Path) -> Iterator[tuple[int, int, bytes]]:
+def _chunks(whole: Any) -> Iterator[tuple[int, int, bytes]]:
     """Where the content of each chunk begins, its tag, and its content; after damage, from the next boundary on."""
-    with _opened(path) as file:
-        if file.read(4) != b"XDF:":
-            raise ValueError("it does not begin as XDF does")
-        while (size := file.read(1)) != b"":
-            length = int.from_bytes(file.read(size[0]), "little") if size[0] in {1, 4, 8} else 0
-            at = file.tell()
-            content = file.read(length if length < _MOST else 0)
-            if 2 <= length == len(content):
-                yield at + 2, int.from_bytes(content[:2], "little"), content[2:]
-                continue
-            file.seek(at)
-            if (found := file.read().find(BOUNDARY)) < 0:
-                return
-            file.seek(at + found + len(BOUNDARY))
-
-
-@lru_cache(maxsize=1)
-def _unpacked(path: Path) -> bytes:
-    with opened(path) as packed:
-        return gzip.decompress(packed.read())
-
-
-def _opened(path: Path) -> Any:
-    return io.BytesIO(_unpacked(path)) if path.suffix.casefold() == ".xdfz" else opened(path)
+    at = 4
+    while 0 <= at < len(whole):
+        begin = at + 1 + whole[at]
+        end = begin + int.from_bytes(whole[at + 1 : begin], "little")
+        if whole[at] in {1, 4, 8} and begin + 2 <= end <= len(whole):
+            yield begin + 2, int.from_bytes(whole[begin : begin + 2], "little"), whole[begin + 2 : end]
+            at = end
+        else:
+            found = whole.find(BOUNDARY, at + 1)
+            at = found + len(BOUNDARY) if found >= 0 else -1
