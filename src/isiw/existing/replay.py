@@ -15,6 +15,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
+from isiw.findings import refused
 from isiw.metrics import f1
 from isiw.plots.comparison import replay_figure
 from isiw.plots.style import save_figure
@@ -153,7 +154,7 @@ def replay(
         expected = f"{_MARKS[0]} pairs and more"
         raise InvalidValueError("too few trials to answer a strategy", got=len(pairs), expected=expected)
     if is_silent([trial.mep_mv for trial in pairs if trial.mep_mv is not None], settings.get("detection_limit_mv")):
-        raise InvalidValueError(f"{NO_MEP}", got=f"{len(pairs)} amplitudes of 0")
+        raise refused(NO_MEP, f"{len(pairs)} amplitudes of 0")
     runs = []
     for name in strategies:
         for seed in range(first_seed, first_seed + seeds):
