@@ -229,10 +229,8 @@ def main(  # noqa: PLR0913, PLR0917 - options of a command line
     folder = out.with_suffix(f".{seed}-{trials}-{banks}{'' if made_up is None else f'-{made_up}'}.sessions")
     folder.mkdir(parents=True, exist_ok=True)
     folds = None if fitted is None else read_folds(json.loads(fitted.read_text(encoding="utf-8")))
-    units, found = (
-        chunks(cohort, [int(each) for each in given.split(",")], trials, folder, folds, known=known, searched=searched),
-        [],
-    )
+    counts, found = [int(each) for each in given.split(",")], []
+    units = chunks(cohort, counts, trials, folder, folds, known=known, searched=searched)
     with Progress() as progress:
         bar = progress.add_task("sessions", total=len(units))
         for _, result in Processes(workers).results(Chunk.run, units):

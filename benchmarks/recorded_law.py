@@ -50,7 +50,7 @@ WINDOWS: Final = ProfilePrior(
     early=(),
 )
 NEARLY = 0.05
-"""How far from the truth a boost that is known may be, natural log."""
+"""How far from the truth a known boost may be, and the drift of amplitudes where nothing changes, natural log."""
 
 
 def all_but_the_law(subject: SimulatedSubject) -> Prior:
