@@ -54,8 +54,9 @@ DRAWN = """() => {
   window.seen = { words: {}, trial: {} };
   const note = (part, number) => { window.seen[part][number] ??= Date.now(); };
   const painted = (part, number) => requestAnimationFrame(() => setTimeout(() => note(part, number)));
-  new MutationObserver(() => painted("words", parseInt(document.getElementById("last").textContent)))
-    .observe(document.getElementById("last"), { childList: true });
+  const title = document.getElementById("sweep-title");
+  new MutationObserver(() => painted("words", Number(title.textContent.match(/\\d+/))))
+    .observe(title, { childList: true });
   const react = Plotly.react;
   Plotly.react = (figure, traces, ...more) => {
     const done = react(figure, traces, ...more);
@@ -155,7 +156,7 @@ def drawn_ms(seed: int, trials: int, iti_s: float) -> dict[str, list[float]]:
             seen = shown.evaluate("() => window.seen")
         browser.close()
         logged = logged_ns(session.log_path)
-    words = {"words": "its number and outcome in words", "trial": "its mark in the picture of the window"}
+    words = {"words": "its number above its sweep", "trial": "its mark in the picture of the window"}
     return {
         name: [seen[part][str(number)] - at / 1e6 for number, at in logged.items() if str(number) in seen[part]]
         for part, name in words.items()
@@ -194,6 +195,8 @@ def main() -> None:
 
 
 def _compare(seed: int, trials: int, iti_s: float, pairs: int) -> None:
+    if not pairs:
+        return
     without, watched = list[Run](), list[Run]()
     for pair in range(pairs):
         for many in (0, 2) if pair % 2 == 0 else (2, 0):
