@@ -3,11 +3,12 @@
     python -m benchmarks.compare --quick
     python -m benchmarks.compare --out benchmarks/results/compare --picture docs/images/results.svg
 
-writes tables and three sentences (Markdown), all figures and README's table (JSON), and a picture (SVG). Rows
-are kept in a folder beside them as sessions finish: the same command continues where it was interrupted. `--first 50`
-ends each row after its first fifty people, `--parts`, `--rows` and `--cohorts` run some rows only; the tables are made
-of all that is in the folder, and say how many people each row has. Recorded people need the folder that
-ISIW_SHARED_DATA names. People of seeds below 1,000 are for work.
+writes tables and three sentences (Markdown), all figures and README's table (JSON), a picture (SVG), and the rows
+(Parquet). Units of work are kept in a folder beside them as they finish: the same command continues where it was
+interrupted, and where another computer left off, from the file of rows. `--first 50` ends each row after its first
+fifty people, `--parts`, `--rows` and `--cohorts` run some rows only; the tables are made of all that is there, and say
+how many people each row has. Recorded people need the folder that ISIW_SHARED_DATA names. People of seeds below 1,000
+are for work.
 """
 
 from __future__ import annotations
@@ -25,7 +26,17 @@ from benchmarks.comparison.guess import with_guess
 from benchmarks.comparison.measures import table_of
 from benchmarks.comparison.picture import picture
 from benchmarks.comparison.rows import EVEN, Part, chosen, parts
-from benchmarks.comparison.running import COHORTS, Plan, processor_ms, rows_of, run_part, timed
+from benchmarks.comparison.running import (
+    COHORTS,
+    Plan,
+    as_study,
+    keep,
+    processor_ms,
+    require_same,
+    rows_of,
+    run_part,
+    timed,
+)
 from benchmarks.comparison.words import DEFAULT, PEOPLE, compared_rows, readable, readme_table, savings, sentences
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
@@ -122,8 +133,10 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
 ) -> None:
     """Compare strategies on the same people."""
     executor = DaskCluster(dask) if dask else Processes(workers)
-    plan = Plan(out.with_suffix(".rows"), people, trials, seed, first, executor)
+    plan = Plan(out, people, trials, seed, first, executor)
     every, wanted = parts(slow_people, reference_people, rows_a_part), [name for name in cohorts.split(",") if name]
+    if wanted:
+        require_same(plan, every[0])
     with Progress() as progress:
         for part in chosen(every, [name for name in only.split(",") if name]):
             for cohort in wanted:
@@ -131,9 +144,10 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
                 run_part(plan, part, cohort, lambda _key, bar=bar: progress.advance(bar))
             if wanted:
                 processor_ms(plan, part)
-    rows = rows_of(plan, every)
+    rows = rows_of(plan)
+    keep(plan, rows)
     facts = facts_of("compare", "numpy", "torch", seed=seed, space="valve, 0–500 ms", **unfinished(plan, every, rows))
-    write(with_guess(rows), timed(plan), facts, out, drawn)
+    write(with_guess(as_study(rows)), timed(plan), facts, out, drawn)
 
 
 if __name__ == "__main__":

@@ -1,23 +1,25 @@
-"""Running the parts of the comparison into a folder, each as a study, and reading what is there.
+"""Running the parts of the comparison, each as a study whose units keep a file each, and reading what is there.
 
-Recorded people are no cohort of isiw's: their sessions are handed to the same executor, and each unit keeps a file.
+What is needed of the rows stands beside the tables, in one small file that another computer continues from.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
 import pandas as pd
 
-from benchmarks.comparison.rows import Part
+from benchmarks.comparison.rows import EVEN, Part
 from benchmarks.recorded_people import RecordedPerson, recordings
 from benchmarks.tables import kept
-from isiw.studies import Failure, Processes, SimulatedSession, Study, Unit, conduct, open_store, run_unit
+from isiw.studies import Failure, Processes, SimulatedSession, Study, Unit, run_unit
 from isiw.studies.execution import Executor, one_thread
 from isiw.subjects import SimulatedSubject
 
@@ -26,6 +28,14 @@ COHORTS: Final = ("recruitment", "gaussian", "kim11-measured", RECORDED)
 BESIDE: Final = "nonresponder"
 """People without a window, who are run where they are asked for."""
 MARKS: Final = (0, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60)
+OF_ROW: Final = ["cohort", "strategy", "person", "trial"]
+ANSWERED: Final = ["true_window", "answered", "reported_window", "start_covered", "end_covered"]
+KEPT: Final = [*OF_ROW, "seed", "unit", "f1", "expected_f1", *ANSWERED]
+"""Columns of a study that the tables need."""
+
+DECIMALS: Final = 4
+"""Of what is kept."""
+
 TIMED: Final = 20
 """Trials of the session that processor time is measured in, at most."""
 
@@ -44,7 +54,7 @@ class Plan:
     """How many people and trials there are, and where rows are kept.
 
     Args:
-        folder: where.
+        out: path of the results, without suffix.
         people: people of each cohort.
         trials: pairs a session.
         seed: of people and strategies.
@@ -52,7 +62,7 @@ class Plan:
         executor: where sessions run.
     """
 
-    folder: Path
+    out: Path
     people: int
     trials: int
     seed: int
@@ -75,13 +85,26 @@ class Plan:
             hit_delay="stated",
         )
 
-    def folder_of(self, part: Part, cohort: str) -> Path:
-        """Where the rows of a part and cohort are kept."""
-        return self.folder / cohort / part.name
+    @property
+    def folder(self) -> Path:
+        """Where the units of this computer are."""
+        return self.out.with_suffix(".rows")
 
+    @property
+    def file(self) -> Path:
+        """Where the rows of all computers are kept, with the processor time of each strategy."""
+        return self.out.with_suffix(".parquet")
 
-class _Enough(Exception):  # noqa: N818 - no error: it ends a study early
-    """The people that were asked for are done."""
+    @cached_property
+    def kept(self) -> pd.DataFrame:
+        """What was there before."""
+        if not self.file.is_file():
+            return pd.DataFrame(columns=[*KEPT, "processor_ms"])
+        return pd.read_parquet(self.file)
+
+    def wants(self, unit: Unit) -> bool:
+        """Whether a unit is of the first people."""
+        return not self.first or unit.sessions[0].person < self.first
 
 
 def run_part(plan: Plan, part: Part, cohort: str, on_done: Callable[[str], None] = lambda _key: None) -> None:
@@ -90,49 +113,49 @@ def run_part(plan: Plan, part: Part, cohort: str, on_done: Callable[[str], None]
     Args:
         plan: people, trials and folder.
         part: the rows.
-        cohort: one of `COHORTS`.
+        cohort: one of `COHORTS`; recorded people are left out where their recordings are not at hand.
         on_done: called with the name of each unit that is finished.
 
     Raises:
-        SystemExit: a session failed.
+        SystemExit: a session failed, or what was kept is of another comparison.
     """
-    if part.cohorts and cohort not in part.cohorts:
+    if (part.cohorts and cohort not in part.cohorts) or (cohort == RECORDED and not recordings().is_dir()):
         return
-    study = plan.study(part, cohort)
-    if cohort == RECORDED:
-        _run_recorded(plan, plan.folder_of(part, cohort), study, on_done)
-        return
-    wanted = {unit.key for unit in _wanted(plan, study.units())}
-    wanted -= _finished(plan.folder_of(part, cohort))
-
-    def note(unit: Unit, result: pd.DataFrame | Failure) -> None:
-        _require(unit, result)
+    study, folder = plan.study(part, cohort), plan.folder / cohort / part.name
+    units = recorded_units(study) if cohort == RECORDED else study.units()
+    there = set(plan.kept["unit"]) | {path.stem for path in folder.glob("*.parquet")}
+    left = [unit for unit in units if unit.key not in there and plan.wants(unit)]
+    for unit, result in plan.executor.results(run_unit, left):
+        kept(folder / f"{unit.key}.parquet", lambda: _require(unit, result))  # noqa: B023 - it is called at once
         on_done(unit.key)
-        wanted.discard(unit.key)
-        if not wanted:
-            raise _Enough
-
-    if wanted:
-        try:
-            conduct(study, plan.folder_of(part, cohort), plan.executor, retry=True, on_done=note)
-        except _Enough:
-            return
-
-
-def _wanted(plan: Plan, units: Sequence[Unit]) -> list[Unit]:
-    return [unit for unit in units if not plan.first or unit.sessions[0].person < plan.first]
-
-
-def _finished(folder: Path) -> set[str]:
-    """The units of a study's folder that have rows."""
-    rows = open_store(folder).rows() if (folder / "study.toml").is_file() else pd.DataFrame()
-    return set(rows["unit"]) if len(rows) else set()
 
 
 def _require(unit: Unit, result: pd.DataFrame | Failure) -> pd.DataFrame:
     if isinstance(result, Failure):
         raise SystemExit(f"{unit.key} failed: {result.error}\n{result.details}")
     return result
+
+
+def require_same(plan: Plan, part: Part) -> None:
+    """Require that isiw still comes to what was kept: the first people at even ISIs are examined again.
+
+    ISIs that are chosen may differ between processors, where two are as good; even ones are the same everywhere.
+
+    Args:
+        plan: with what was kept.
+        part: the one with even ISIs.
+
+    Raises:
+        SystemExit: it does not.
+    """
+    before = plan.kept[(plan.kept["strategy"] == EVEN) & (plan.kept["cohort"] != RECORDED)]
+    if before.empty:
+        return
+    cohort = str(before["cohort"].iloc[0])
+    unit = next(unit for unit in plan.study(part, cohort).units() if unit.sessions[0].label == EVEN)
+    both = run_unit(unit).round(DECIMALS).merge(before[before["cohort"] == cohort], on=[*OF_ROW, "seed"])
+    if both.empty or before["trial"].max() != plan.trials or (both["f1_x"] != both["f1_y"]).any():
+        raise SystemExit(f"{plan.file} is of another comparison, or isiw comes to other answers now: use another --out")
 
 
 def recorded_units(study: Study) -> list[Unit]:
@@ -158,48 +181,59 @@ def _recorded(session: SimulatedSession) -> SimulatedSession:
     return stated.as_the_rig_states()
 
 
-def _run_recorded(plan: Plan, folder: Path, study: Study, on_done: Callable[[str], None]) -> None:
-    if not recordings().is_dir():
-        return
-    folder.mkdir(parents=True, exist_ok=True)
-    left = [unit for unit in _wanted(plan, recorded_units(study)) if not (folder / f"{unit.key}.parquet").is_file()]
-    for unit, result in plan.executor.results(run_unit, left):
-        kept(folder / f"{unit.key}.parquet", lambda: _require(unit, result))  # noqa: B023 - it is called at once
-        on_done(unit.key)
-
-
-def rows_of(plan: Plan, every: Sequence[Part]) -> pd.DataFrame:
-    """All rows that are there, of all cohorts.
+def rows_of(plan: Plan) -> pd.DataFrame:
+    """All rows that are there, of all cohorts: those that were kept, and those of the folder.
 
     Args:
-        plan: the folder.
-        every: the parts.
+        plan: where.
 
     Raises:
         SystemExit: there are none.
     """
-    read = [_read(plan.folder_of(part, cohort)) for cohort in (*COHORTS, BESIDE) for part in every]
-    if not (found := [table for table in read if len(table)]):
-        raise SystemExit(f"{plan.folder} has no rows yet.")
-    return pd.concat(found, ignore_index=True)
+    files = sorted(plan.folder.glob("*/*/*.parquet"))
+    tables = [plan.kept[KEPT], *(pd.read_parquet(path, columns=KEPT) for path in files)]
+    if not (found := [table for table in tables if len(table)]):
+        raise SystemExit(f"{plan.out} has no rows yet.")
+    rows = pd.concat(found, ignore_index=True).drop_duplicates(OF_ROW).sort_values(OF_ROW, ignore_index=True)
+    return rows.round(DECIMALS)
 
 
-def _read(folder: Path) -> pd.DataFrame:
-    if (folder / "study.toml").is_file():
-        return open_store(folder).rows()
-    files = sorted(folder.glob("*.parquet"))
-    return pd.concat(map(pd.read_parquet, files), ignore_index=True) if files else pd.DataFrame()
+def keep(plan: Plan, rows: pd.DataFrame) -> None:
+    """Keep all rows, and the processor time of each strategy, for whoever continues.
+
+    Args:
+        plan: where.
+        rows: what `rows_of` gives.
+    """
+    every = rows.assign(processor_ms=rows["strategy"].map(timed(plan)))
+    every.to_parquet(plan.file, index=False, compression="zstd")
+
+
+def as_study(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows that were kept with the other columns of a study, as far as they are known.
+
+    Args:
+        rows: what `rows_of` gives.
+    """
+    unknown = ("stop_trial", "stop_f1", "converged", "ask_ms", "tell_ms")
+    return rows.assign(delivered=rows["trial"], **dict.fromkeys(unknown, math.nan))
 
 
 def processor_ms(plan: Plan, part: Part) -> None:
-    """Time each row of a part, one session of one person alone; what was timed before is not timed again."""
+    """Time each row of a part, one session of one person alone; what was timed before is not timed again.
+
+    Args:
+        plan: where times are kept.
+        part: the rows.
+    """
     study = Study(part.strategies, ("recruitment",), 1, plan.seed, min(plan.trials, TIMED), (1,), hit_delay="stated")
     folder = plan.folder / "processor"
     folder.mkdir(parents=True, exist_ok=True)
+    before = timed(plan)
     for unit in study.units():
         (session,) = unit.sessions
-        file = folder / f"{session.label}.json"
-        if not file.is_file():
+        if session.label not in before:
+            file = folder / f"{session.label}.json"
             file.write_text(json.dumps(_processor_ms(session)), encoding="utf-8")
 
 
@@ -217,6 +251,7 @@ def _processor_ms(session: SimulatedSession) -> float:
 
 
 def timed(plan: Plan) -> dict[str, float]:
-    """Processor time of a trial [ms] by row, as far as it was measured."""
+    """Processor time of a trial [ms] by row, as far as it was measured, here or by whoever kept rows."""
+    before = plan.kept.groupby("strategy")["processor_ms"].first().dropna().to_dict()
     files = (plan.folder / "processor").glob("*.json")
-    return {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in files}
+    return before | {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in files}

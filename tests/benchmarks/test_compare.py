@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,17 @@ import pytest
 from benchmarks.comparison import running
 from benchmarks.comparison.measures import lasting, ratio, table_of
 from benchmarks.comparison.rows import EVEN, GUESS, Part, chosen, matrix, parts
-from benchmarks.comparison.running import RECORDED, Plan, recorded_units, rows_of, run_part
+from benchmarks.comparison.running import (
+    RECORDED,
+    Plan,
+    as_study,
+    keep,
+    recorded_units,
+    require_same,
+    rows_of,
+    run_part,
+    timed,
+)
 from benchmarks.comparison.words import choosing, compared_rows, ratio_of, readme_table, saving, sentences, trusting
 from benchmarks.quick import expanded
 
@@ -173,12 +184,37 @@ def test_what_was_interrupted_continues_with_the_same_rows(
 
     with pytest.raises(KeyboardInterrupt):
         run_part(plan_in(tmp_path / "a"), FAST, cohort, killed)
-    assert len(rows_of(plan_in(tmp_path / "a"), [FAST])) == 3 * len((0, 5))
+    assert len(rows_of(plan_in(tmp_path / "a"))) == 3 * len((0, 5))
     run_part(plan_in(tmp_path / "a"), FAST, cohort, ran.append)
     assert sorted(ran) == sorted({*ran})
     run_part(plan_in(tmp_path / "b"), FAST, cohort)
-    again, once = (rows_of(plan_in(tmp_path / name), [FAST]).drop(columns=["ask_ms", "tell_ms"]) for name in "ab")
+    again, once = (rows_of(plan_in(tmp_path / name)) for name in "ab")
     pd.testing.assert_frame_equal(again, once)
+
+
+@pytest.mark.slow
+def test_another_computer_continues_from_the_rows_alone(tmp_path: Path) -> None:
+    here, there = plan_in(tmp_path / "here"), plan_in(tmp_path / "there")
+    run_part(replace(here, first=2), FAST, "gaussian")
+    keep(here, rows_of(here))
+    shutil.copy(here.file, there.file)
+    ran: list[str] = []
+    require_same(there, FAST)
+    run_part(there, FAST, "gaussian", ran.append)
+    assert ran == ["random.gaussian.00002-00002", "even.gaussian.00002-00002"]
+    run_part(here, FAST, "gaussian")
+    pd.testing.assert_frame_equal(rows_of(there), rows_of(here))
+    table_of(as_study(rows_of(there)), timed(there))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("other", [{"f1": 0.5}, {"seed": 4}, {"trial": 7}])
+def test_rows_of_another_comparison_are_not_continued(tmp_path: Path, other: Mapping[str, float]) -> None:
+    plan = plan_in(tmp_path / "plan")
+    run_part(replace(plan, first=1), FAST, "gaussian")
+    keep(plan, rows_of(plan).assign(**other))
+    with pytest.raises(SystemExit, match="another comparison"):
+        require_same(plan_in(tmp_path / "plan"), FAST)
 
 
 def person(number: int) -> isiw.subjects.SimulatedSubject:
