@@ -7,7 +7,8 @@ The recordings lie in no repository of ours: `--data`, or the variable ISIW_SHAR
 and knows all else but start and width; `--known` adds the default with all that who knows the law knows besides (that
 there is a window, the law of windows, form, impact and boost, and that nothing changes), but not the law; `--searched`
 adds the default after a search for the motor threshold of the same law; `--fitted` adds the default with the prior that
-`benchmarks.response_prior` fitted to all other persons. `--banks coils` draws from both curves of a coil, trials from
+`benchmarks.response_prior` fitted to all other persons; `--lab` adds the default with the prior that `isiw prior learn`
+makes of nine earlier sessions, one of each other person. `--banks coils` draws from both curves of a coil, trials from
 every second pulse and what is known from the other half. `--made-up 10` puts hands of the default's own law in the
 place of who was recorded, so many pulses a level. Sessions are kept beside the result as they finish, and the same
 command continues where it was interrupted. Standard errors are by bootstrap over the ten persons, each with all banks.
@@ -18,9 +19,10 @@ from __future__ import annotations
 
 import json
 import re
+import tempfile
 import warnings
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, cast
@@ -31,14 +33,17 @@ import typer
 from rich.progress import Progress
 
 import isiw
+from benchmarks.earlier import logged_session
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.recorded_law import KnowsTheLaw, all_but_the_law
-from benchmarks.recorded_people import Banks, RecordedPerson, RecordedResponse, recordings
+from benchmarks.recorded_people import Banks, RecordedPerson, RecordedResponse, banks, recordings
 from benchmarks.recorded_tables import tables_of
 from benchmarks.response_prior import Fit, read_folds
 from benchmarks.tables import kept, write_tables
 from isiw.errors import ImplausibleDataWarning
+from isiw.models.particles.prior import Prior
+from isiw.priors import LabPrior, learn, read_lab_prior, write_lab_prior
 from isiw.studies import Failure, Processes
 
 SPACE: Final = isiw.VALVE_SPACE
@@ -48,6 +53,9 @@ TOO_GOOD: Final = "law and draws from the same half (too good)"
 ELSE: Final = "default that knows all but the law"
 SEARCHED: Final = "default, after a search for the motor threshold"
 FITTED: Final = "default, prior fitted to the other persons"
+LEARNT: Final = "default, prior learnt from a session of each other person"
+EARLIER_TRIALS, EARLIER_NUMBERS = 40, 100_000
+"""Of an earlier session; and the number that its people begin with, whom nobody else has."""
 IMPACT_SD_MS: Final = 1.0
 """How far from the truth an impact that is known may be [ms]."""
 
@@ -61,17 +69,17 @@ class RecordedSession:
 
     Args:
         person: the person.
-        strategy: `default`, `SEARCHED`, `ELSE`, `FITTED`, `LAW` or `TOO_GOOD`.
+        strategy: `default`, `SEARCHED`, `ELSE`, `FITTED`, `LEARNT`, `LAW` or `TOO_GOOD`.
         given: how many single pulses are given first.
         trials: how many pairs are delivered.
-        fit: numbers of the default's prior, of `FITTED` alone.
+        prior: the default's, of `FITTED` and `LEARNT` alone.
     """
 
     person: RecordedPerson
     strategy: str
     given: int
     trials: int
-    fit: Fit | None = None
+    prior: Prior | None = None
 
     @property
     def label(self) -> str:
@@ -94,8 +102,8 @@ class RecordedSession:
         known: dict[str, Any] = {"hit_delay_ms": subject.stated_hit_delay_ms}
         if self.strategy == ELSE:
             known = {"hit_delay_ms": (subject.hit_delay_ms, IMPACT_SD_MS), "prior": all_but_the_law(subject)}
-        elif self.fit is not None:
-            known["prior"] = self.fit.prior()
+        elif self.prior is not None:
+            known["prior"] = self.prior
         strategy = isiw.make_strategy("default", SPACE, seed, **known)
         for intensity_pct_rmt, mep_mv in self.person.single_pulses(self.given):
             strategy.tell(None, mep_mv, intensity_pct_rmt=intensity_pct_rmt)
@@ -156,12 +164,43 @@ class Chunk:
             return pd.DataFrame([row for session in self.sessions for row in session.rows()])
 
 
+@dataclass(frozen=True)
+class Earlier:
+    """Nine earlier sessions of a lab, one of each person but one, and the file of the prior that they teach.
+
+    Args:
+        without: one with the person who is left out, of the cohort that is examined later.
+        file: where the prior is kept.
+    """
+
+    without: RecordedPerson
+    file: Path
+
+    def prior(self) -> Prior:
+        """The prior, from the file if it is there."""
+        if not self.file.is_file():
+            write_lab_prior(self._learnt(), self.file)
+        return read_lab_prior(self.file).joined()
+
+    def _learnt(self) -> LabPrior:
+        seen, logs, number = {self.without.bank.person}, list[Path](), EARLIER_NUMBERS
+        with tempfile.TemporaryDirectory() as folder:
+            for person in sorted({bank.person for bank in banks(self.without.folder, self.without.banks)} - seen):
+                while (one := replace(self.without, number=number)).bank.person != person:
+                    number += 1
+                subject, name, seed = one.subject(), f"P{person}", one.seed + number
+                stated = subject.stated_hit_delay_ms
+                logs.append(logged_session(subject, name, seed, EARLIER_TRIALS, Path(folder), stated))
+            return learn(logs)
+
+
 def chunks(
     people: list[RecordedPerson],
     given: list[int],
     trials: int,
     folder: Path,
     folds: Mapping[int, Fit] | None = None,
+    learnt: Mapping[int, Prior] | None = None,
     *,
     known: bool = False,
     searched: bool = False,
@@ -176,6 +215,7 @@ def chunks(
         trials: how many pairs are delivered.
         folder: where rows are kept.
         folds: the fit without each person; None for no fitted priors.
+        learnt: the prior that the other persons teach; None for none.
         known: also the default that knows all but the law.
         searched: also the default after a search for the motor threshold.
     """
@@ -184,15 +224,16 @@ def chunks(
         plan.append((TOO_GOOD, 0))
     plan += [(SEARCHED, 0)] * searched
     plan += [(ELSE, count) for count in given if known]
-    plan += [(FITTED, count) for count in given if folds]
+    plan += [(FITTED, count) for count in given if folds] + [(LEARNT, count) for count in given if learnt]
     fits = folds or {}
+    priors = {FITTED: {person: fit.prior() for person, fit in fits.items()}, LEARNT: learnt or {}}
     names = {strategy: re.sub("[^a-z]+", "_", strategy) for strategy, _ in plan}
     names[FITTED] = f"fitted_{zlib.crc32(repr(fits).encode()):08x}"
     parts = [people[first : first + TOGETHER] for first in range(0, len(people), TOGETHER)]
     return [
         Chunk(
             tuple(
-                RecordedSession(each, strategy, count, trials, fits[each.bank.person] if strategy == FITTED else None)
+                RecordedSession(each, strategy, count, trials, priors.get(strategy, {}).get(each.bank.person))
                 for each in part
             ),
             folder / f"{names[strategy]}-{count}-{part[0].number}-{len(part)}.parquet",
@@ -218,6 +259,7 @@ def main(  # noqa: PLR0913, PLR0917 - options of a command line
     searched: Annotated[
         bool, typer.Option("--searched", help="Also the default after a search for the threshold.")
     ] = False,
+    lab: Annotated[bool, typer.Option("--lab", help="Also the default with a prior of nine earlier sessions.")] = False,
 ) -> None:
     """Compare the default with who knows the law, on recorded people."""
     data = data or recordings()
@@ -229,19 +271,31 @@ def main(  # noqa: PLR0913, PLR0917 - options of a command line
     folder = out.with_suffix(f".{seed}-{trials}-{banks}{'' if made_up is None else f'-{made_up}'}.sessions")
     folder.mkdir(parents=True, exist_ok=True)
     folds = None if fitted is None else read_folds(json.loads(fitted.read_text(encoding="utf-8")))
-    counts, found = [int(each) for each in given.split(",")], []
-    units = chunks(cohort, counts, trials, folder, folds, known=known, searched=searched)
+    counts = [int(each) for each in given.split(",")]
+    first = {one.bank.person: one for one in reversed(cohort)}
+    earlier = {person: Earlier(one, folder / f"lab-{person}.toml") for person, one in first.items() if lab}
     with Progress() as progress:
-        bar = progress.add_task("sessions", total=len(units))
-        for _, result in Processes(workers).results(Chunk.run, units):
-            if isinstance(result, Failure):
-                raise SystemExit(f"a session failed: {result.error}\n{result.details}")
-            found.append(result)
-            progress.advance(bar)
-    rows = pd.concat(found, ignore_index=True)
+        priors = list(_done(progress, "earlier sessions", Earlier.prior, list(earlier.values()), workers))
+        learnt = dict(zip(earlier, priors, strict=True))
+        units = chunks(cohort, counts, trials, folder, folds, learnt, known=known, searched=searched)
+        rows = pd.concat(_done(progress, "sessions", Chunk.run, units, workers), ignore_index=True)
     facts = facts_of("recorded_cohort", "numpy", seed=seed, sessions=people, space="valve, 0–500 ms")
     write_tables(tables_of(rows, cohort, SPACE, LAW), facts, out)
     print(out.with_suffix(".md").read_text())
+
+
+def _done(
+    progress: Progress, what: str, run: Callable[[Any], Any], units: Sequence[Any], workers: int
+) -> Iterator[Any]:
+    """What each unit of work, which has a file, comes to, in their order; it ends with the first that fails."""
+    bar = progress.add_task(what, total=len(units), visible=bool(units))
+    found = {}
+    for unit, result in Processes(workers).results(run, units):
+        if isinstance(result, Failure):
+            raise SystemExit(f"a session failed: {result.error}\n{result.details}")
+        found[unit.file] = result
+        progress.advance(bar)
+    yield from (found[unit.file] for unit in units)
 
 
 if __name__ == "__main__":

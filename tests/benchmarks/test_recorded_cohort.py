@@ -8,7 +8,19 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from benchmarks.recorded_cohort import ELSE, LAW, SEARCHED, TOO_GOOD, Chunk, RecordedSession, chunks, main
+from benchmarks.recorded_cohort import (
+    EARLIER_NUMBERS,
+    ELSE,
+    LAW,
+    LEARNT,
+    SEARCHED,
+    TOO_GOOD,
+    Chunk,
+    Earlier,
+    RecordedSession,
+    chunks,
+    main,
+)
 from benchmarks.recorded_law import BINS, SPREAD_EVENLY, histograms, windows
 from benchmarks.recorded_people import ADDED_MV, Bank, RecordedPerson, RecordedResponse, banks, smoothed
 from benchmarks.recorded_tables import error_by_person, sure_and_wrong
@@ -32,6 +44,9 @@ def made_up(tmp_path: Path) -> Path:
     names = ["person", "coil", "intensity_pct_rmt", "mep_mv", "pulse", "use"]
     pd.DataFrame(rows, columns=names).to_csv(tmp_path / "shayofir" / "fdi_recruitment_trials.csv", index=False)
     return tmp_path
+
+
+subject = RecordedPerson.subject
 
 
 def counted() -> Bank:
@@ -155,13 +170,26 @@ def test_the_command_writes_its_tables(made_up: Path, tmp_path: Path, capsys: py
         out=tmp_path / "result",
         known=True,
         searched=True,
+        lab=True,
     )
     written = (tmp_path / "result.md").read_text(encoding="utf-8")
     assert written in capsys.readouterr().out
     titles = ("By pairs", "At the stopping rule", "Without any pair", "By person", "What it believes")
     assert all(f"## {title}\n" in written for title in titles)
-    assert {LAW, ELSE, SEARCHED} <= set(re.findall(r"(?m)^\| (\S[^|]*?) +\|", written))
+    assert {LAW, ELSE, LEARNT, SEARCHED} <= set(re.findall(r"(?m)^\| (\S[^|]*?) +\|", written))
     assert TOO_GOOD not in written
+
+
+@pytest.mark.slow
+def test_a_lab_s_prior_is_of_the_other_persons_and_learnt_once(made_up: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[RecordedPerson] = []
+    monkeypatch.setattr("benchmarks.recorded_cohort.EARLIER_TRIALS", 3)
+    monkeypatch.setattr(RecordedPerson, "subject", lambda self: asked.append(self) or subject(self))
+    earlier = Earlier(RecordedPerson(0, 5, made_up), made_up / "lab.toml")
+    prior = earlier.prior()
+    assert [(one.bank.person, one.number >= EARLIER_NUMBERS) for one in asked] == [(2, True)]
+    assert earlier.prior() == prior
+    assert len(asked) == 1
 
 
 def test_sessions_of_one_person_are_no_independent_witnesses() -> None:
