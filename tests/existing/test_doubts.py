@@ -93,7 +93,7 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
                                       "means of several trials.*beside 'sd'"),
     "means beside how many they are of": (means("mep_mv", n_averaged=10), {}, "beside 'n_averaged'"),
     "means with limits of their confidence": (means("mep_mv", ci_lower=0.1, ci_upper=2.0), {}, "beside 'ci_lower'"),
-    "means between limits": (means("mep_mv", a=np.linspace(0, 0.8, 9), b=np.linspace(0.2, 1, 9)), {}, "beside 'a'"),
+    "means between limits": (means("mep_mv", a=np.linspace(0, 0.8, 9), b=np.linspace(0.2, 1, 9)), {}, "'a'.*the SD of"),
     "means by how many they are of": (renamed(mep_mv="MEP, n=10"), {"columns": {"mep": "MEP, n=10"}, "units": ("mV",)},
                                       "means of several"),
     "means in one word": (renamed(mep_mv="mepmean"), {"columns": {"mep": "mepmean"}, "units": ("mV",)}, "means of"),
