@@ -165,9 +165,7 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
     found = {}
     for key, column in columns.items():
         if len(signs[key]) > 1:
-            raise column.doubted(
-                "has decimal commas and decimal points", None, "Write one of them in all of its cells."
-            )
+            raise column.doubted("has decimal commas and decimal points", None, "Write one of them in all cells.")
         if stated is not None and signs[key] and stated not in signs[key]:
             expected = f"{''.join(signs[key])!r}, as its numbers have"
             why, remedy = "has another decimal sign than the one that is stated", "Leave --decimal out, or correct it."

@@ -64,12 +64,12 @@ def _require_isis(columns: Columns) -> None:
     times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
     for odd in {min(times, default=0.0), max(times, default=0.0)}:
         others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}
-        if len(others) < 2:
+        if len(others) < 2 or (times[odd] < 3 and odd <= max(499.0, 3 * max(others))):
             continue
         if times[odd] < 3:
-            if odd > max(499.0, 3 * max(others)):
-                row = next(row for row in paired if isi.number(row) == odd)
-                isi.doubt("is far longer than all others", None, "Correct it; if it is right", row=row)
+            isi.doubt(
+                "is far longer than all others", None, "Correct it; if it is right", row=paired[isis_ms.index(odd)]
+            )
             continue
         apart = odd <= 0 or odd > 2 * max(others)
         strange = odd in {-1, -9, 99, 999} or odd > max(499.0, 2 * max(others))
@@ -204,12 +204,8 @@ def _require_no_spread(columns: Columns) -> None:
     for name, column in columns.beside.items():
         shares = column.numbers[columns.rows] / np.where(meps > 0, meps, np.nan)
         is_emg = unit_in(name) in {None, *EMG_UNITS} and not re.search(_OF_REST, words_of(name))
-        if (
-            is_emg
-            and np.all((shares >= 0) & (shares < 1))
-            and np.median(shares) > _LEAST_SD
-            and np.unique(column.texts).size > len(isis) / 2
-        ):
+        is_less = ((shares >= 0) & (shares < 1)).all() and np.median(shares) > _LEAST_SD
+        if is_emg and is_less and 2 * len({*column.texts}) > len(isis):
             remedy = "Export the single trials; if these are, and it is something else"
             column.doubt("is a part of each amplitude, as the SD of a mean is, and ISIs come once", None, remedy)
 

@@ -38,8 +38,7 @@ _SHARED: Final = 0.8
 _LAST: Final = 2000  # so many rows at most are compared with those below them
 _USUAL: Final = 10  # figures are what stands below trials in most files, the first half of these in nearly all
 _MEASURE: Final = re.compile(r"laten[cz]|\btemp|\biti\b|inter.?trial|\brms\b")  # or what scatters by itself
-_LAST_NUMBER: Final = re.compile(r"(.*?)(\d+)(\D*)")
-_TIME: Final = re.compile(r"\d{1,2}:\d\d|\d{4}-\d\d-\d\d")
+_LAST_NUMBER, _TIME = re.compile(r"(.*?)(\d+)(\D*)"), re.compile(r"\d{1,2}:\d\d|\d{4}-\d\d-\d\d")
 _EVEN, _ITS_OWN = 3.0, 0.98  # steps of trials are alike within such a factor; numbers so like ISIs are the ISIs
 _CHANCE: Final = 0.02  # with which single trials are hardly by chance what they seem
 _NO_REMARKS: Final = WORDS["alone"] | WORDS["tap alone"] | WORDS["yes"]
@@ -231,11 +230,11 @@ def _require_unnumbered(columns: Columns) -> None:
     is_known = {"order", "date"} & columns.of.keys() or len(rows) < _SEVERAL
     for column in () if is_known else columns.beside.values():
         texts, places = [column.text(row) for row in rows], column.numbers[rows]
-        named = [_LAST_NUMBER.fullmatch(text) for text in texts]
+        named = [found.groups() for text in texts if (found := _LAST_NUMBER.fullmatch(text))]
         if all(map(_TIME.match, texts)):
-            places = np.array(times_of(texts) or np.nan)
-        elif not np.isfinite(places).any() and len({(one[1], one[3]) if one else None for one in named}) == 1:
-            places = np.array([float(one[2]) if one else np.nan for one in named])
+            places = np.array(times_of(texts) or [np.nan] * 2)
+        elif not np.isfinite(places).any() and len(named) == len(texts) and len({one[::2] for one in named}) == 1:
+            places = np.array([float(number) for _, number, _ in named])
         steps = np.diff(np.sort(places, axis=None))
         if not (np.isfinite(steps).all() and np.quantile(steps, 0.1) * _EVEN > np.quantile(steps, 0.9)):
             continue
@@ -286,9 +285,8 @@ def _require_one_kind(columns: Columns) -> None:
     """Raise if an unused column has several values at each ISI, as one of muscles, people, sides or conditions has."""
     isi = columns["isi"]
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
-    block = columns.of.get("block", columns.empty)
-    words = [text for text in block.texts if len(text) > 1 and not re.search(r"\d|^[IVX]+$", text)]
-    of_words = {block.name: block} if words else {}
+    block = columns["block"]
+    of_words = {block.name: block} if any(re.fullmatch(r"(?![IVX]+$)\D{2,}", text) for text in block.texts) else {}
     for name, column in {**columns.beside, **of_words}.items() if by_isi else ():
         texts = {row: column.text(row).casefold() for _, row in by_isi}
         alone = [row for row, text in texts.items() if " " in plain(text) and plain(text) in WORDS["alone"]]

@@ -93,7 +93,7 @@ _ANY_TITLES: Final = {
     r"(\d+|two|three|four|five|six|eight|ten|several) (\w+ )?(meps|sweeps|trials|pulses|stimuli|responses)|"
     r"\b(meps|sweeps|trials|frames|pulses) (averaged|gemittelt)\W*(?!1\b)\d": "to be means of several trials",
     r"\bunits of \d": "to be multiplied",
-    r"\b(rows?|trials?|sweeps?|zeilen?|versuche?|essais|lignes) \d+ ?(-|–|to|bis|à) ?\d+": "to be of several kinds",
+    r"\b(rows?|trials?|sweeps?|zeilen?|versuche?|essais) \d+ ?(-|–|to|bis|à) ?\d+:? [^\W\d]": "to be of several kinds",
 }  # what a title says in whatever clause
 _TITLES: Final = {
     r"%|per ?cent|prozent|pour ?cent|por ?ciento|\bz-? ?scor|\b(log|ln)s?\d*\b(?! ?(file|book|sheet))|\blogar|"
