@@ -190,7 +190,7 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "one amplitude": (table().assign(mep_mv=5.0), {}, "have codes; got '5'"),
     "milliamperes": (renamed(mep_mv="Amplitude (mA)"), {"units": ("mV",)}, "a unit of no amplitudes; got 'mA'"),
     "peaks": (renamed(mep_mv="MEP max (mV)"), {"columns": {"mep": "MEP max (mV)"}}, "of another measure"),
-    **{f"sorted by ISIs, beside {name}": (table().assign(**{name: cells}).sort_values("isi_ms"), {}, f"'{name}' .* number th")
+    **{f"sorted, beside {name}": (table().assign(**{name: cells}).sort_values("isi_ms"), {}, f"'{name}' .* number")
        for name, cells in (("試行", range(36)), ("t", 5.3 * np.arange(36)), ("clock", [time[11:] for time in TIMES]),
                            ("file", [f"S3_{n:03}.cfs" for n in range(36)]))},
     "copies that are numbered on": (pd.concat([table()] * 2).assign(trial=range(72)), {}, "or each row twice"),
@@ -259,7 +259,7 @@ PLAIN: dict[str, pd.DataFrame] = {
     "times of pulses": table(t_tms_ms=ISIS + 100, mep2_mv=ISIS / 99),
     "another muscle beside measured ISIs": table(mep2_mv=ISIS / 99).assign(isi_ms=np.linspace(9.1, 200.3, 36)),
     "all below the limit": table().assign(mep_mv=0.0),
-    "measures of few values": table(latency_ms=of([20, 21, 22]), iti_s=of([5, 6]), **{"baseline µV": of([3, 4, 5])}),
+    "measures of few values": table(onset_ms=of([20, 21, 22]), iti_s=of([5, 6]), **{"baseline µV": of([3, 4, 5])}),
     "responses": table(response=np.where((ISIS > 60) & (ISIS < 140), "yes", "no")),
     "one word in all rows": table(experimenter=of(["EK"])),
 }  # fmt: skip

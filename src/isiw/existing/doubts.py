@@ -37,12 +37,13 @@ _ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
 _LAST: Final = 2000  # so many rows at most are compared with those below them
 _USUAL: Final = 10  # figures are what stands below trials in most files, the first half of these in nearly all
-_MEASURE: Final = re.compile(r"laten[cz]|\btemp|\biti\b|inter.?trial|\brms\b")  # or what scatters by itself
+_MEASURE: Final = re.compile(r"laten[cz]|\bonset|\btemp|\biti\b|inter.?trial|\brms\b")  # or what scatters by itself
 _LAST_NUMBER, _TIME = re.compile(r"(.*?)(\d+)(\D*)"), re.compile(r"\d{1,2}:\d\d|\d{4}-\d\d-\d\d")
 _EVEN, _ITS_OWN = 3.0, 0.98  # steps of trials are alike within such a factor; numbers so like ISIs are the ISIs
 _CHANCE: Final = 0.02  # with which single trials are hardly by chance what they seem
 _NO_REMARKS: Final = WORDS["alone"] | WORDS["tap alone"] | WORDS["yes"]
 _BELOW_TRIALS: Final = "Delete the rows below the trials; if these are trials, number all in a column called trial."
+_IF_NO_TRIAL: Final = "Delete the row if it is a sum or a mean; what it says of trials, write into a column of theirs."
 _IS_FIGURE: Final = "seems to be a mean of rows above, or an SD"
 _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
@@ -61,8 +62,7 @@ def require_single_trials(
     for one in others:
         for odd in dict.fromkeys(cell for cell in one.cells if isinstance(cell, str) and says_only(cell, known)):
             if len(odd) >= _CODE or not any(cell == other == odd for cell, other in pairwise(one.cells)):
-                remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
-                raise one.refused(one.cells.index(odd), "is none of a trial", remedy)
+                raise one.refused(one.cells.index(odd), "is none of a trial", _IF_NO_TRIAL)
     heading = f"{mep.of}\n{frame.attrs.get('title', '')}"
     bare = [row for row, cells in enumerate(zip(mep.texts, isi.texts, strict=True)) if not any(cells)]
     below = [", ".join(cell for one in others if isinstance(cell := one.cells[row], str)) for row in bare]
@@ -207,7 +207,7 @@ def _require_ascending(columns: Columns) -> None:
     known = {row: text for row in columns.rows if (text := order.text(row))}
     odd = [row for row, text in known.items() if order.name == columns["date"].name or not _NUMBER.fullmatch(text)]
     if 0 < len(odd) < len(known):
-        raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
+        raise order.refused(odd[0], "is none of a trial", _IF_NO_TRIAL)
     places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
     pairs = zip(map(block.text, known), places, strict=False)
     in_blocks = [[*each] for _, each in groupby(pairs, itemgetter(0))]
