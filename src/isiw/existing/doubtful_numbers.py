@@ -143,8 +143,7 @@ def _require_one_unit(columns: Columns) -> None:
     others = [number for row in {*columns.rows} - {*coded} if (number := mep.number(row)) is not None]
     are_apart = bool(coded) and (mep.number(coded[0]) or 0.0) > 2 * max(others, default=np.inf)
     if (len(coded) >= _FEW or are_apart) and len({mep.text(row) for row in coded}) == 1:
-        remedy = "If it does, leave these cells empty; if not"
-        mep.doubt("may stand for no amplitude", None, remedy, row=coded[0])
+        mep.doubt("may stand for no amplitude", None, "If it does, leave these cells empty; if not", row=coded[0])
     for key, (least, most) in _POSSIBLE.items():
         column = columns[key]
         numbers = np.sort([number for row in columns.paired if (number := column.number(row)) and number > 0])
@@ -203,7 +202,7 @@ def _require_no_spread(columns: Columns) -> None:
         return
     for name, column in columns.beside.items():
         shares = column.numbers[columns.rows] / np.where(meps > 0, meps, np.nan)
-        is_emg = unit_in(name) in {None, *EMG_UNITS} and not re.search(_OF_REST, words_of(name))
+        is_emg = (len(name) == 1 or unit_in(name) in {None, *EMG_UNITS}) and not re.search(_OF_REST, words_of(name))
         is_less = ((shares >= 0) & (shares < 1)).all() and np.median(shares) > _LEAST_SD
         if is_emg and is_less and 2 * len({*column.texts}) > len(isis):
             remedy = "Export the single trials; if these are, and it is something else"
@@ -264,5 +263,4 @@ def _require_one_row_each(columns: Columns) -> None:
     comes_again = (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2)
     if max(times_of_rows.values(), default=0) > 1 or (comes_again and not is_known):
         why = f"is of ISIs that come {max(times, 2)} times each, as if muscles had a row each, or each row twice"
-        remedy = "Leave one row for each trial; if each row is one"
-        mep.doubt(why, ", ".join(texts[: 2 * max(times, 2)]), remedy)
+        mep.doubt(why, ", ".join(texts[: 2 * max(times, 2)]), "Leave one row for each trial; if each row is one")

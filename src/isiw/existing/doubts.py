@@ -209,8 +209,7 @@ def _require_ascending(columns: Columns) -> None:
     if 0 < len(odd) < len(known):
         raise order.refused(odd[0], "is none of a trial", _IF_NO_TRIAL)
     places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
-    pairs = zip(map(block.text, known), places, strict=False)
-    in_blocks = [[*each] for _, each in groupby(pairs, itemgetter(0))]
+    in_blocks = [[*each] for _, each in groupby(zip(map(block.text, known), places, strict=False), itemgetter(0))]
     if any(each != sorted(each) for each in in_blocks):
         what = f"the rows of {order.of} are not in the order of its column {order.name!r}"
         remedy = "Sort them as the trials were delivered, or name the column that says so: --column order=NAME; if it "
