@@ -35,14 +35,7 @@ def of_text(text: str, folder: Path, **said: Any) -> list[Delivered]:
         "id,isi_ms,mep_mv\n1,10,0.15\n2,20,.3\n3,40,.5\n",
         "isi_ms,mep_mv\n10,0.15\n20,.3\n40,.5\n\nRMT: 48 % MSO, coil: D70\n",
     ],
-    ids=[
-        "a sign at each end",
-        "where R numbers",
-        "cells left out below a title",
-        "remarks",
-        "an id of trials",
-        "a foot",
-    ],
+    ids=["a sign at each end", "R's numbers", "cells left out", "remarks", "an id of trials", "a foot"],
 )
 def test_rows_and_names_fit_each_other(text: str, tmp_path: Path) -> None:
     assert trials_of(of_text(text, tmp_path)) == [(10, 0.15), (20, 0.3), (40, 0.5)]
@@ -143,8 +136,9 @@ def test_the_metadata_of_epochs_are_read_as_the_columns_of_a_table() -> None:
     (person,) = read_people(epochs(exclude=[0, 1, 0, 0, 0, 0], note="x"), KNOWN)
     assert [trial.told for trial in person.trials] == [True, False, True, True, True, True]
     assert person.unused == ("note",)
-    with pytest.raises(InvalidValueError, match="several people"):
-        read_people(epochs(subject=[*"AABBBB"]), KNOWN)
+    for said, asked in (({"subject": [*"AABBBB"]}, "several people"), ({"n_averaged": 8}, "rows of .* are means of")):
+        with pytest.raises(InvalidValueError, match=asked):
+            read_people(epochs(**said), KNOWN)
     (person,) = read_people(silent(condition=["paired"] * 4 + ["single"] * 2, isi_ms=[30.0, 60, 90, 120, 0, 0]), KNOWN)
     assert [trial.isi_ms is None for trial in person.trials] == [False] * 4 + [True] * 2
     (person,) = read_people(silent(isi_ms=[30.0, 60, 90, 120, -45, -45]), KNOWN)
@@ -162,6 +156,7 @@ def test_days_come_first_with_points_and_slashes_are_asked_about() -> None:
     assert person.created.startswith("2024-01-10T09:05")
     (person,) = dated(*["01/13/2024"] * 4)
     assert person.created.startswith("2024-01-13")
+    assert dated(*["2024-01-10_10h22.31.554"] * 4)[0].created.startswith("2024-01-10T10:22:31.554")  # of PsychoPy
     with pytest.raises(InvalidValueError, match="Write dates as 2026-01-31"):
         dated(*["10/01/2024"] * 4)
     (person,) = dated("2024-01-31", "", "", "")

@@ -58,8 +58,7 @@ def renamed(**names: str) -> pd.DataFrame:
 
 
 def means(name: str, **beside: Any) -> pd.DataFrame:
-    made = pd.DataFrame({"isi_ms": np.unique(ISIS), name: np.linspace(0.1, 0.9, 9)})
-    return made.assign(**beside)
+    return pd.DataFrame({"isi_ms": np.unique(ISIS), name: np.linspace(0.1, 0.9, 9), **beside})
 
 
 MEAN_MV, SD_MV = table()["mep_mv"].mean(), table()["mep_mv"].std()
@@ -93,13 +92,14 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
                                       "means of several trials.*beside 'sd'"),
     "means beside how many they are of": (means("mep_mv", n_averaged=10), {}, "beside 'n_averaged'"),
     "means with limits of their confidence": (means("mep_mv", ci_lower=0.1, ci_upper=2.0), {}, "beside 'ci_lower'"),
-    "means between limits": (means("mep_mv", a=np.linspace(0, 0.8, 9), b=np.linspace(0.2, 1, 9)), {}, "beside 'a'"),
+    "means between limits": (means("mep_mv", a=np.linspace(0, 0.8, 9), b=np.linspace(0.2, 1, 9)), {}, "'a'.*the SD of"),
     "means by how many they are of": (renamed(mep_mv="MEP, n=10"), {"columns": {"mep": "MEP, n=10"}, "units": ("mV",)},
                                       "means of several"),
+    "means with a Greek letter": (means("mep_mv", σ=np.linspace(0.04, 0.2, 9)), {}, "'σ'.*the SD of.*--where \"σ="),
     "means in one word": (renamed(mep_mv="mepmean"), {"columns": {"mep": "mepmean"}, "units": ("mV",)}, "means of"),
     **{name: (renamed(mep_mv=name), {"columns": {"mep": name}, "units": ("uV",)}, "relative")
        for name in ("MEPnorm", "zMEP", "MEP (a.u.)", "MEP/control", "mep_x_baseline", "MEP fold change", "MEP_Mmax",
-                    "MEP residual", "predicted_mep", "dMEP", "MEP dB", "MEP - control", "MEP rank", "MEP^0.5")},
+                    "MEP比", "MEP residual", "predicted_mep", "dMEP", "MEP dB", "MEP - control", "MEP rank", "MEP^.5")},
     "two units": (table().rename(columns={"mep_mv": "mep_mv (µV)"}), {}, "says two units; got 'uV and mV'"),
     "an ISI of 0 in many rows": (table().assign(isi_ms=np.where(ISIS > 60, ISIS, 0.0)), {}, "--alone 0 if they are"),
     "an ISI of 0 more often than another": (table().assign(isi_ms=np.repeat([0.0, 40, 80, 120, 160], [11, 7, 6, 6, 6])),
@@ -190,6 +190,14 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "one amplitude": (table().assign(mep_mv=5.0), {}, "have codes; got '5'"),
     "milliamperes": (renamed(mep_mv="Amplitude (mA)"), {"units": ("mV",)}, "a unit of no amplitudes; got 'mA'"),
     "peaks": (renamed(mep_mv="MEP max (mV)"), {"columns": {"mep": "MEP max (mV)"}}, "of another measure"),
+    **{f"sorted, beside {name}": (table().assign(**{name: cells}).sort_values("isi_ms"), {}, f"'{name}' .* number")
+       for name, cells in (("試行", range(36)), ("t", 5.3 * np.arange(36)), ("clock", [time[11:] for time in TIMES]),
+                           ("file", [f"S3_{n:03}.cfs" for n in range(36)]))},
+    "copies that are numbered on": (pd.concat([table()] * 2).assign(trial=range(72)), {}, "or each row twice"),
+    "blocks of words": (long("run", ["left", "right"], blocks=True), {}, "'run' .* several values at each ISI"),
+    "the last block first": (long("block", ["2", "1"], blocks=True), {}, "'block' .* does not ascend"),
+    "one ISI that is far longer": (table().assign(isi_ms=np.where(np.arange(36) == 7, 600, ISIS)), {}, "row 8 .* far"),
+    "kinds of rows below": (with_below(["Trials 1-20 FCR, 21-36 ECR", None]), {}, "to be of several kinds"),
     "a value that is not there": (long("muscle", ["FCR", "FDI"]), {"where": {"muscle": "APB"}}, "one of FCR, FDI"),
 }  # fmt: skip
 
@@ -251,7 +259,7 @@ PLAIN: dict[str, pd.DataFrame] = {
     "times of pulses": table(t_tms_ms=ISIS + 100, mep2_mv=ISIS / 99),
     "another muscle beside measured ISIs": table(mep2_mv=ISIS / 99).assign(isi_ms=np.linspace(9.1, 200.3, 36)),
     "all below the limit": table().assign(mep_mv=0.0),
-    "latencies": table(latency_ms=np.linspace(18, 24, 36).round(1)),
+    "measures of few values": table(onset_ms=of([20, 21, 22]), iti_s=of([5, 6]), **{"baseline µV": of([3, 4, 5])}),
     "responses": table(response=np.where((ISIS > 60) & (ISIS < 140), "yes", "no")),
     "one word in all rows": table(experimenter=of(["EK"])),
 }  # fmt: skip

@@ -51,8 +51,7 @@ LINES = {
 
 
 @pytest.mark.parametrize(
-    ("line", "says"),
-    [(line, says) for says, lines in LINES.items() for line in lines.split(" | ")],
+    ("line", "says"), [(line, says) for says, lines in LINES.items() for line in lines.split(" | ")]
 )
 def test_a_line_above_or_below_the_trials_says_what_they_are(line: str, says: str, tmp_path: Path) -> None:
     rows, path = table().to_csv(index_label="trial", sep=";"), tmp_path / "P01.csv"

@@ -283,7 +283,7 @@ BROKEN: dict[str, tuple[str, dict[str, Any], str]] = {
     "nothing": ("", {}, "no table that can be read"),
     "empty lines": (HEAD + ",\n,\n", {}, "has no trials"),
     "a comma that may be of thousands": ("isi_ms;mep_mv\n10;1,250\n20;2,300\n", {}, "--decimal ,"),
-    "a comma among points": ("isi_ms;mep_mv\n10;0.5\n20;1.250,5\n", {}, "is no number"),
+    "a comma among points": ("isi_ms;mep_mv\n10;0.5\n20;1.250,5\n", {}, "decimal commas and decimal points"),
     "an unknown status": ("isi_ms,mep_mv,status\n10,0.1,perhaps\n", {}, "neither yes nor no"),
     "no date": ("isi_ms,mep_mv,date\n10,0.1,yesterday\n20,0.3,yesterday\n", {}, "is no date"),
     "more cells than names": (HEAD + "10,0.1\n20,0.3,4,5\n", {}, "no table that can be read"),

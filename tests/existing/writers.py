@@ -369,10 +369,7 @@ def as_statistics(path: Path, label: str = "Peak to peak (µV)", of_isis: Mappin
     """A table with labels of columns, which have the units, and of values among the ISIs."""
     frame = pd.DataFrame({"isi": [*ISIS_MS, -1.0], "mep": [1e3 * mep for mep in (*MEPS_MV, 0.3)]})
     labels = {float(isi) if path.suffix == ".sav" else isi: text for isi, text in of_isis.items()}
-    said: dict[str, Any] = {
-        "column_labels": ["Interval (ms)", label],
-        "variable_value_labels": {"isi": labels},
-    }
+    said: dict[str, Any] = {"column_labels": ["Interval (ms)", label], "variable_value_labels": {"isi": labels}}
     if path.suffix == ".dta":
         frame["isi"] = frame["isi"].astype(int)
         pyreadstat.write_dta(frame, str(path), **said)

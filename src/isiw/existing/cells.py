@@ -30,6 +30,7 @@ _ZONE: Final = re.compile(r":.*(z|utc|gmt|[+-]\d\d:?\d\d)\s*$", re.IGNORECASE)
 _FURTHEST_BEHIND: Final = dt.timedelta(hours=12)  # nowhere on Earth is the time of the day further behind UTC
 _ERROR: Final = re.compile(r"#(N/?[AV]|[^\W_/]+(/0)?[!?])")  # in whatever language
 _REMEDY: Final = "Write dates as 2026-01-31."
+_PSYCHOPY: Final = re.compile(r"_(\d\d)h(\d\d)\.(\d\d)")  # a time of the day as PsychoPy writes it behind a date
 _MANY: Final = 2**16  # so many texts are remembered: in a long table most cells are like others
 
 
@@ -163,6 +164,8 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
     usual = stated or (all_signs.pop() if len(all_signs) == 1 else None)
     found = {}
     for key, column in columns.items():
+        if len(signs[key]) > 1:
+            raise column.doubted("has decimal commas and decimal points", None, "Write one of them in all cells.")
         if stated is not None and signs[key] and stated not in signs[key]:
             expected = f"{''.join(signs[key])!r}, as its numbers have"
             why, remedy = "has another decimal sign than the one that is stated", "Leave --decimal out, or correct it."
@@ -171,7 +174,7 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
             sign = "comma" if "," in doubtful else "point"
             why = f"has a {sign} that may be a decimal sign, or group thousands"
             raise column.doubted(why, doubtful, "Say --decimal , or --decimal .")
-        found[key] = replace(column, decimal=max(signs[key], key=",.".find, default=usual or "."))
+        found[key] = replace(column, decimal=max(signs[key], default=usual or "."))
     return found
 
 
@@ -214,7 +217,7 @@ def without_unit_in_cells(name: str, cells: Sequence[Any]) -> tuple[str, Sequenc
 
 def dates_of(column: Column, rows: Iterable[int]) -> dict[int, dt.datetime]:
     """The dates of rows, in UTC; those of empty cells are left out."""
-    texts = {row: text for row in rows if (text := column.text(row))}
+    texts = {row: _PSYCHOPY.sub(r" \1:\2:\3", text) for row in rows if (text := column.text(row))}
     day_first = _day_first(texts.values())
     if day_first is None:
         raise column.refused(next(iter(texts)), "may have the day first, or the month", _REMEDY)

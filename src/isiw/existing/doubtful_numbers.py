@@ -26,9 +26,10 @@ _HALF: Final = (
     r"\b(peak|trough|valley|pos(itive?)?|neg(ative?)?|min(imum)?|max(imum)?|[np][12]|spitze|tal|pic|pico|picco)\b"
 )
 _OF_REST: Final = (  # what says of EMG that it is no MEP, or of a number that it is another measure
-    r"backgr|noise|base|rest|\bpre|rms|hintergrund|rausch|bruit|fond|ruido|rumore|ruis|area|auc|fläche|\bsd\b"
+    r"backgr|noise|base|rest|\bpre|rms|hintergrund|rausch|bruit|fond|ruido|rumore|ruis|area|auc|fläche|laten[cz]|\bsd\b"
 )
 _WITH, _ITS_HALF, _EXACT = 0.8, 0.7, 0.02  # halves correlate so with amplitudes, and are seldom a larger share of them
+_ORDERED, _LEAST_SD = 0.25, 0.02  # of a table of means most ISIs ascend; the least SD of MEPs, as a share of them
 _FEW, _FEWEST = 3, 12  # in a table with fewer rows ISIs may come again by chance
 _LONG_BEFORE_MS: Final = 50.0  # no pulse is given so long before the tap
 _NO_MEP: Final = {"none", "n.d.", "k.a.", "-", "--", "–", "—", ".", "?"}  # in an amplitude's place
@@ -38,8 +39,8 @@ _NEAR_MS, _ALIKE = (1.0, 25.0), 0.98  # so far from each other are ISIs that wer
 
 def require_plain_numbers(columns: Columns) -> None:
     """Raise if the numbers of ISIs and amplitudes seem to be something else, in two units, or of each row twice."""
-    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each, _require_whole, _require_absolute,
-                  _require_uncut):  # fmt: skip
+    for doubt in (_require_one_unit, require_plain_isis, _require_one_row_each, _require_no_spread, _require_whole,
+                  _require_absolute, _require_uncut):  # fmt: skip
         doubt(columns)
 
 
@@ -63,7 +64,12 @@ def _require_isis(columns: Columns) -> None:
     times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
     for odd in {min(times, default=0.0), max(times, default=0.0)}:
         others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}
-        if times[odd] < 3 or len(others) < 2:
+        if len(others) < 2 or (times[odd] < 3 and odd <= max(499.0, 3 * max(others))):
+            continue
+        if times[odd] < 3:
+            isi.doubt(
+                "is far longer than all others", None, "Correct it; if it is right", row=paired[isis_ms.index(odd)]
+            )
             continue
         apart = odd <= 0 or odd > 2 * max(others)
         strange = odd in {-1, -9, 99, 999} or odd > max(499.0, 2 * max(others))
@@ -127,7 +133,7 @@ def _require_one_column_each(columns: Columns) -> None:
 def _require_one_unit(columns: Columns) -> None:
     """Raise if some numbers cannot be what they are, are about a thousand times the others, and none lies between."""
     mep = columns["mep"]
-    coded = [row for row in columns.rows if mep.text(row).removesuffix(".0") in {"99", "999", "9999"}]
+    coded = [row for row in columns.rows if mep.numbers[row] in {99, 999, 9999}]
     words = {row: cell.strip() for row in columns.rows if isinstance(cell := mep.cells[row], str)}
     said = [row for row, word in words.items() if word.casefold() in _NO_MEP and word != "None"]
     said = [row for row in said if columns.lost(row) is None and not columns.tap_alone(row)]
@@ -137,8 +143,7 @@ def _require_one_unit(columns: Columns) -> None:
     others = [number for row in {*columns.rows} - {*coded} if (number := mep.number(row)) is not None]
     are_apart = bool(coded) and (mep.number(coded[0]) or 0.0) > 2 * max(others, default=np.inf)
     if (len(coded) >= _FEW or are_apart) and len({mep.text(row) for row in coded}) == 1:
-        remedy = "If it does, leave these cells empty; if not"
-        mep.doubt("may stand for no amplitude", None, remedy, row=coded[0])
+        mep.doubt("may stand for no amplitude", None, "If it does, leave these cells empty; if not", row=coded[0])
     for key, (least, most) in _POSSIBLE.items():
         column = columns[key]
         numbers = np.sort([number for row in columns.paired if (number := column.number(row)) and number > 0])
@@ -190,6 +195,20 @@ def _require_uncut(columns: Columns) -> None:
             mep.doubt(f"has amplitudes that seem to be {is_what}", got, f"{remedy}they were measured")
 
 
+def _require_no_spread(columns: Columns) -> None:
+    """Raise if amplitudes of ISIs that ascend, each once, have beside them what may be the SDs of means."""
+    isis, meps = (columns[key].numbers[columns.rows] for key in ("isi", "mep"))
+    if np.unique(isis).size < max(len(isis), _FEW) or abs(np.mean(np.diff(isis) > 0) - 0.5) < _ORDERED:
+        return
+    for name, column in columns.beside.items():
+        shares = column.numbers[columns.rows] / np.where(meps > 0, meps, np.nan)
+        is_emg = (len(name) == 1 or unit_in(name) in {None, *EMG_UNITS}) and not re.search(_OF_REST, words_of(name))
+        is_less = ((shares >= 0) & (shares < 1)).all() and np.median(shares) > _LEAST_SD
+        if is_emg and is_less and 2 * len({*column.texts}) > len(isis):
+            remedy = "Export the single trials; if these are, and it is something else"
+            column.doubt("is a part of each amplitude, as the SD of a mean is, and ISIs come once", None, remedy)
+
+
 def _require_whole(columns: Columns) -> None:
     """Raise if amplitudes seem to be halves, by the other half in a column beside them."""
     mep, halves = columns["mep"], _halves_beside(columns)
@@ -231,18 +250,17 @@ def _halves_beside(columns: Columns) -> dict[str, FloatArray]:
 
 def _require_one_row_each(columns: Columns) -> None:
     """Raise if the ISIs come twice as if each trial had a row a muscle: one after the other, or all of them again."""
-    isi = columns["isi"]
-    texts, meps = ([columns[key].text(row) for row in columns.rows] for key in ("isi", "mep"))
-    if "order" in columns.of or columns.layout.where or len(texts) < _FEWEST:
-        return
+    isi, mep = columns["isi"], columns["mep"]
+    texts, meps = ([column.text(row) for row in columns.rows] for column in (isi, mep))
+    is_known = "order" in columns.of or bool(columns.layout.where) or len(texts) < _FEWEST
+    few = 6 if is_known else 4  # so many trials in a row never come again
+    rows = zip(*(zip(texts[n:], meps[n:], strict=False) for n in range(few)), strict=False)
+    times_of_rows = Counter(each for each in rows if len({text for _, text in each}) == few)
     runs = [len([*each]) for _, each in groupby(texts)]
     times, half = math.gcd(*runs), len(texts) // 2
     are_whole = all(round(isi.number(row) or 0.0, 3).is_integer() for row in columns.paired)
     again = texts[:half] == texts[half:] and not are_whole  # as realised ISIs never do
-    four = zip(*(zip(texts[n:], meps[n:], strict=False) for n in range(4)), strict=False)
-    times_of_four = Counter(rows for rows in four if len({mep for _, mep in rows}) == 4)
-    again |= max(times_of_four.values(), default=0) > 1  # nor four trials in a row
-    if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
-        what = f"the ISIs of {isi.of} come {max(times, 2)} times each, as if muscles had a row each, or each row twice"
-        remedy = "Leave one row for each trial; if each row is one, number them in a column called trial."
-        raise InvalidValueError(what, got=", ".join(texts[: 2 * max(times, 2)]), remedy=remedy)
+    comes_again = (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2)
+    if max(times_of_rows.values(), default=0) > 1 or (comes_again and not is_known):
+        why = f"is of ISIs that come {max(times, 2)} times each, as if muscles had a row each, or each row twice"
+        mep.doubt(why, ", ".join(texts[: 2 * max(times, 2)]), "Leave one row for each trial; if each row is one")

@@ -8,7 +8,7 @@ import statistics
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations, groupby, pairwise
+from itertools import groupby, pairwise
 from operator import itemgetter
 from typing import TYPE_CHECKING, Final
 
@@ -17,7 +17,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import Column, times_of
 from isiw.existing.delivered import Delivered
-from isiw.existing.layout import WORDS, Layout, letters, plain, unit_in
+from isiw.existing.layout import EMG_UNITS, WORDS, Layout, letters, plain, unit_in
 from isiw.existing.names import MEANS, TITLES_OF_MEANS, is_remark, is_verdict, require_title, says_only, words_of
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
@@ -37,9 +37,13 @@ _ROWS_A_PART: Final = 4  # so many trials at least have a mean below them
 _SHARED: Final = 0.8
 _LAST: Final = 2000  # so many rows at most are compared with those below them
 _USUAL: Final = 10  # figures are what stands below trials in most files, the first half of these in nearly all
+_MEASURE: Final = re.compile(r"laten[cz]|\bonset|\btemp|\biti\b|inter.?trial|\brms\b")  # or what scatters by itself
+_LAST_NUMBER, _TIME = re.compile(r"(.*?)(\d+)(\D*)"), re.compile(r"\d{1,2}:\d\d|\d{4}-\d\d-\d\d")
+_EVEN, _ITS_OWN = 3.0, 0.98  # steps of trials are alike within such a factor; numbers so like ISIs are the ISIs
 _CHANCE: Final = 0.02  # with which single trials are hardly by chance what they seem
 _NO_REMARKS: Final = WORDS["alone"] | WORDS["tap alone"] | WORDS["yes"]
 _BELOW_TRIALS: Final = "Delete the rows below the trials; if these are trials, number all in a column called trial."
+_IF_NO_TRIAL: Final = "Delete the row if it is a sum or a mean; what it says of trials, write into a column of theirs."
 _IS_FIGURE: Final = "seems to be a mean of rows above, or an SD"
 _ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
@@ -58,21 +62,18 @@ def require_single_trials(
     for one in others:
         for odd in dict.fromkeys(cell for cell in one.cells if isinstance(cell, str) and says_only(cell, known)):
             if len(odd) >= _CODE or not any(cell == other == odd for cell, other in pairwise(one.cells)):
-                remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
-                raise one.refused(one.cells.index(odd), "is none of a trial", remedy)
+                raise one.refused(one.cells.index(odd), "is none of a trial", _IF_NO_TRIAL)
     heading = f"{mep.of}\n{frame.attrs.get('title', '')}"
     bare = [row for row, cells in enumerate(zip(mep.texts, isi.texts, strict=True)) if not any(cells)]
     below = [", ".join(cell for one in others if isinstance(cell := one.cells[row], str)) for row in bare]
-    require_title("\n".join([heading, *below]), mep, reference, frame.attrs.get("notes", ""))
+    if mep.name:  # or there are sweeps beside the ISIs
+        require_title("\n".join([heading, *below]), mep, reference, frame.attrs.get("notes", ""))
     title = TITLES_OF_MEANS.search(words_of(heading)) if once else None
     is_counted = bool(counted_in) and (once or re.search("sweep|averag|mep", letters(counted_in[0])))
-    limits = [one for one in others if not np.allclose(one.numbers, mep.numbers, rtol=0.01)] if once else []
-    for one, other in combinations(limits if len(others) < _BELOW else (), 2):  # such as those of confidence
-        spreads += [one.name] if np.allclose(one.numbers + other.numbers, 2 * mep.numbers, rtol=0.01) else []
     if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or is_counted:
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
-        what = f"the rows of {mep.of} are means of several trials, by the column {mep.name!r}"
-        what += "".join(f" beside {name!r}" for name in beside)
+        what = f"the rows of {mep.of} are means of several trials, by the column "
+        what += " beside ".join(map(repr, filter(None, [mep.name, *beside])))
         expected = "a row for each trial, since the scatter of single trials says how sure a window is"
         remedy = "Export the single trials; if these are, rename the column."
         raise InvalidValueError(what, expected=expected, remedy=remedy)
@@ -159,7 +160,8 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 
 def require_one_kind_each(columns: Columns) -> None:
     """Raise if rows are not of one person's single trials of one muscle, in their order and in one unit."""
-    for doubt in (_require_ascending, _require_said, _require_no_remarks, _require_one_kind, _require_one_intensity):
+    for doubt in (_require_ascending, _require_unnumbered, _require_said, _require_no_remarks, _require_one_kind,
+                  _require_one_intensity):  # fmt: skip
         doubt(columns)
 
 
@@ -196,16 +198,18 @@ def _require_ascending(columns: Columns) -> None:
             remedy = f'If it tells muscles apart, say --where "{block.name}={text}"; if all belong together'
             block.doubt("comes back after another block", text, remedy, row=next(rows))
         seen.add(text)
+    numbers = [int(text) for row in columns.rows if (text := block.text(row)).isdecimal()]
+    if numbers != sorted(numbers):
+        block.doubt("does not ascend", None, "Sort the rows as the trials were delivered; if they are")
     if (order := columns.of.get("order") or columns.of.get("date")) is None:
         return
     order = replace(order, decimal=columns["isi"].decimal)
     known = {row: text for row in columns.rows if (text := order.text(row))}
     odd = [row for row, text in known.items() if order.name == columns["date"].name or not _NUMBER.fullmatch(text)]
     if 0 < len(odd) < len(known):
-        raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
+        raise order.refused(odd[0], "is none of a trial", _IF_NO_TRIAL)
     places = times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]  # of the day, perhaps
-    pairs = zip(map(block.text, known), places, strict=False)
-    in_blocks = [[*each] for _, each in groupby(pairs, itemgetter(0))]
+    in_blocks = [[*each] for _, each in groupby(zip(map(block.text, known), places, strict=False), itemgetter(0))]
     if any(each != sorted(each) for each in in_blocks):
         what = f"the rows of {order.of} are not in the order of its column {order.name!r}"
         remedy = "Sort them as the trials were delivered, or name the column that says so: --column order=NAME; if it "
@@ -217,6 +221,26 @@ def _require_ascending(columns: Columns) -> None:
         remedy = 'Leave one row for each trial, such as that of a muscle: --where "muscle=FCR"; or say --column '
         remedy += "subject=NAME of people, or --column block=NAME of blocks."
         raise InvalidValueError(what, got=f"{twice[0]:g}", remedy=remedy)
+
+
+def _require_unnumbered(columns: Columns) -> None:
+    """Raise if a column of which nothing is read has numbers as even as those of trials, or times, out of order."""
+    rows, isis = columns.rows, columns["isi"].numbers[columns.rows]
+    is_known = {"order", "date"} & columns.of.keys() or len(rows) < _SEVERAL
+    for column in () if is_known else columns.beside.values():
+        texts, places = [column.text(row) for row in rows], column.numbers[rows]
+        named = [found.groups() for text in texts if (found := _LAST_NUMBER.fullmatch(text))]
+        if all(map(_TIME.match, texts)):
+            places = np.array(times_of(texts) or [np.nan] * 2)
+        elif not np.isfinite(places).any() and len(named) == len(texts) and len({one[::2] for one in named}) == 1:
+            places = np.array([float(number) for _, number, _ in named])
+        steps = np.diff(np.sort(places, axis=None))
+        if not (np.isfinite(steps).all() and np.quantile(steps, 0.1) * _EVEN > np.quantile(steps, 0.9)):
+            continue
+        known = np.isfinite(isis)
+        if (np.diff(places) < 0).any() and not abs(np.corrcoef(places[known], isis[known])[0, 1]) > _ITS_OWN:
+            remedy = "Sort the rows as the trials were delivered; if it says something else"
+            column.doubt("seems to number the trials, in another order than their rows", texts[0], remedy)
 
 
 def _require_said(columns: Columns) -> None:
@@ -260,7 +284,9 @@ def _require_one_kind(columns: Columns) -> None:
     """Raise if an unused column has several values at each ISI, as one of muscles, people, sides or conditions has."""
     isi = columns["isi"]
     by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
-    for name, column in columns.beside.items() if by_isi else ():
+    block = columns["block"]
+    of_words = {block.name: block} if any(re.fullmatch(r"(?![IVX]+$)\D{2,}", text) for text in block.texts) else {}
+    for name, column in {**columns.beside, **of_words}.items() if by_isi else ():
         texts = {row: column.text(row).casefold() for _, row in by_isi}
         alone = [row for row, text in texts.items() if " " in plain(text) and plain(text) in WORDS["alone"]]
         if alone and len({*texts.values()}) > 1:
@@ -327,7 +353,8 @@ def kinds_at_each(by_isi: Sequence[tuple[float, int]], column: Column) -> list[s
     kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
     if len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
         return _seldom_states(by_isi, column)
-    is_measure = len(kinds) > _FEW and (unit_in(column.name) or not all(map(str.isdigit, kinds)))
+    unit, is_known = unit_in(column.name), _MEASURE.search(words_of(column.name))
+    is_measure = unit in EMG_UNITS or is_known or (len(kinds) > _FEW and (unit or not all(map(str.isdigit, kinds))))
     if not are_words and (is_measure or len(kinds) > len(by_isi) / _ROWS_A_NUMBER or _counts_again(column, by_isi)):
         return []
     usual = min(kinds.values()) if are_words else len(texts) / len(kinds)

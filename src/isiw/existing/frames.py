@@ -196,8 +196,7 @@ def _without_foot(rows: list[list[Any]]) -> tuple[list[list[Any]], str]:
     kept, foot = len(rows), ""
     for row in reversed(rows):
         said = [cell for cell in row if not is_missing(cell)]
-        are_lines = all(isinstance(cell, str) and (cell.count(" ") >= _WORDS or ": " in cell) for cell in said)
-        if not are_lines:
+        if not all(isinstance(cell, str) and (cell.count(" ") >= _WORDS or ": " in cell) for cell in said):
             break
         kept, foot = kept - 1, "\n".join([*said, foot])
     return (rows[:kept], f"\n{foot}") if foot.strip() else (rows, "")

@@ -15,20 +15,22 @@ if TYPE_CHECKING:
 
 ALL: Final = "*"  # what `where` says of a column whose values are to be analysed together
 MEANS: Final = re.compile(
-    r"means?|average|avg|median|mittel(wert)?|moyen(ne)?s?|promedios?|\bmedi[ae]\b|gemiddelden?|\bn ?= ?\d+"
+    r"means?|average|avg|median|mittel(wert)?|moyen(ne)?s?|promedios?|\bm[eé]di[ae]\b|gemiddelden?|\bn ?= ?\d+|"
+    r"średni|ortalama|平均|x̄"
 )
 TITLES_OF_MEANS: Final = re.compile(
-    r"\b(means?|averages?|averaged|avg|mittelwerte?|gemittelte?n?|moyennes?|promedios?|medi[ae]|gemiddelden?)\b"
+    r"\b(means?|averages?|averaged|avg|mittelwerte?|gemittelte?n?|moyennes?|promedios?|m[eé]di[ae]s?|gemiddelden?|"
+    r"średni\w*|ortalama\w*)\b|平均"
 )  # what the names of files and sheets, and titles, say of means
 _ORIGINS: Final = {
     "impact": r"valve|ventil|\bcommand|\bcmd\b|solenoid|vanne|v[aá]lvula|valvola|\bklep|actuator",
     "valve": r"\b(impact|hit|contact|aufprall|acceler)",
 }  # from another event
-_BASES: Final = "(control|base|baseline|mean|unconditioned|kontrolle|tests?|ts|tms alone|single|m ?max)"
+_BASES: Final = r"(contr[oô]\w*|base|baseline|mean|unconditioned|kontrolle|tests?|ts|tms alone|single|m ?max)"
 _SCALED: Final = (
-    r"%|\bper ?c(ent)?|\bpct\b|pro[zc]ent|p(our|or)cent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|"
+    r"%|yüzde|比|\bper ?c|\bpct\b|pro[zc]ent|p(our|or)cent|\bratio\b|quotient|\b(ge|z)?norm(ed|ali[sz]\w*|iert)?\b|"
     r"\brel(ati\w*)?\b|\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|"
-    r"\bdb\b|\brank|[\^√]|\bresid|\bfraction\b|box.?cox|fitted|predict|smooth|winsor|detrend|adjusted|\bcent(ere|re)d|standardi[sz]|"
+    r"\bdb|ggü|gegenüber|\brank|[\^√]|\bresid|\bfraction\b|box.?cox|fitted|predict|smooth|winsor|detrend|adjusted|\bcent(ere|re)d|standardi[sz]|"
     rf"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|([/÷]|\b(x|times|div|by|vs|re)\b) ?{_BASES}\b"
 )
 RELATIVE: Final = (
@@ -36,11 +38,14 @@ RELATIVE: Final = (
     r"\bmep\b.*\bmep\b|\bindex\b(?! ?finger)"
 )
 WHOLE: Final = r"peak\W*(to|2)?\W*peak|\bp\W?(2|to|t)?\W?p\b|max\w*\W+(to\W+)?min"  # from peak to peak
-_HALVES: Final = r"\b(bas[ei]|zero|0|onset|null|neg|pos)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b"
+_HALVES: Final = (
+    r"\b(bas[ei]|zero|0|onset|null|neg|pos)\w* ?(-|to)* ?(peak|spitze|crête|pic)|\bhalf\b|\b0-p\b|one.sided"
+)
 _MEASURES: Final = (
     rf"{_HALVES}|\b[aá]rea\b|\baire\b|fläche|\bauc\b|\brms\d*\b|tkeo|teager|\babs\b|\benv\b|integra|\biemg\b|rectif|\brect\b(?!\W*(fem|abd))|gleichger|"
     r"\b(envelope|arv|mav|turns|power|energy|snr|counts|adc|adu|lsb)\b|"
-    r"latenc|[\[(] ?(counts?|adc|adu|bits?|lsb|digits?|units?|[cm]m|kv|pu|sd|au)\b|"
+    r"lat[eê]n[ctz]|superfici|oppervlak|\bdur(ation|ée|ata|ación)|dauer\b|silent|\bcsp\b|\bh.?reflex|\bforce\b|kraft|"
+    r"[\[(] ?(counts?|adc|adu|bits?|lsb|digits?|units?|[cm]m|kv|pu|sd|au)\b|"
     r"\b[mµμu]?v([²/]| ?[*·×] ?m?s\b|m?s\b)"
 )
 _ENDS: Final = rf"^(?!.*({WHOLE})).*\b(trough|max|maximum|min|minimum)\b"
@@ -78,15 +83,17 @@ _ORDERS: Final = {
     r"\b(trigger|trig|ttl)\b": "counts from a trigger: of the tap, or of the valve?",
     _REVERSED: "says that the pulse came before the tap",
 }  # what the name of ISIs says of what they count from
-_OF_AMPLITUDES: Final = re.compile(r"\b(meps?|amplitu\w*|values?|werte|responses?|emg)\b")
+_OF_AMPLITUDES: Final = re.compile(r"\b(meps?|amplitu\w*|values?|werte|responses?|emg)\b|ampiezz")
 _OF_INTENSITY: Final = re.compile(r"rmt|amt\b|\bmso\b|\bmt\b|threshold|intensit|stimulator|output|mvc|confiden|\bci\b")
 _AFTER: Final = r"\b(from|after|since|relative to|ab|nach|seit|depuis|desde|dalla?)"
 _ANY_TITLES: Final = {
-    rf"(%|per ?cent|prozent|pour ?cent|por ?ciento) (of|vom|von|der|de|du|del|van) ?(the )?{_BASES}|"
-    r"\bnormali[sz]ed\b|\bnormiert|\bmeps? ?/": "to be relative",
+    rf"(%|p(er|our|or|ro) ?[zc](ent\w*|iento)) (of|vom|von|der|de|du|del|van) ?(the )?{_BASES}|"
+    r"\b(ge|z)?norm(ali[sz]\w*|iert)|\bmeps? ?/|^%$": "to be relative",
     r"\b(averages?|averaged|means?|mittel\w*|gemittelt|moyennes?) (of|over|across|von|aus|über|de) "
-    r"(\d+|two|three|four|five|six|eight|ten|several) (meps|sweeps|trials|pulses|stimuli|responses)|"
+    r"(\d+|two|three|four|five|six|eight|ten|several) (\w+ )?(meps|sweeps|trials|pulses|stimuli|responses)|"
     r"\b(meps|sweeps|trials|frames|pulses) (averaged|gemittelt)\W*(?!1\b)\d": "to be means of several trials",
+    r"\bunits of \d": "to be multiplied",
+    r"\b(rows?|trials?|sweeps?|zeilen?|versuche?|essais) \d+ ?(-|–|to|bis|à) ?\d+:? [^\W\d]": "to be of several kinds",
 }  # what a title says in whatever clause
 _TITLES: Final = {
     r"%|per ?cent|prozent|pour ?cent|por ?ciento|\bz-? ?scor|\b(log|ln)s?\d*\b(?! ?(file|book|sheet))|\blogar|"

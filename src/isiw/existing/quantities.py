@@ -116,10 +116,11 @@ class Columns:
         if "status" in layout.columns and {*map(columns["status"].flag, range(len(frame)))} == {None, True}:
             cells = ["no" if is_missing(cell) else cell for cell in columns["status"].cells]
             columns["status"] = replace(columns["status"], cells=cells)
+        empty = Column("", [None] * len(frame), of=source)
         if "mep" in columns:
             columns["mep"] = replace(columns["mep"], remedy=_OF_MEPS)
-            others = [one for one in every if one.name != held["mep"]]
-            doubts.require_single_trials(columns["mep"], columns["isi"], others, frame, layout.reference)
+        others = [one for one in every if one.name != held.get("mep")]
+        doubts.require_single_trials(columns.get("mep", empty), columns["isi"], others, frame, layout.reference)
         free = [(one.name if one.name.strip() else f"column {place}", one) for place, one in enumerate(every, 1)
                 if one.name not in used and (one.name.strip() or any(one.texts))]  # fmt: skip
         beside = {name: replace(one, name=name, is_stated=name in layout.where) for name, one in free}
@@ -132,7 +133,6 @@ class Columns:
             of_pairs = replace(condition, cells=["" if plain(text) in alone else text for text in condition.texts])
             if len({*map(plain, of_pairs.texts)} - {""}) > 1:
                 beside[condition.name] = of_pairs
-        empty = Column("", [None] * len(frame), of=source)
         return cls(columns, _chosen([*columns.values(), *beside.values()], layout), layout, stated, beside, empty)
 
 

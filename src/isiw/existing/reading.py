@@ -231,7 +231,9 @@ def _trial(columns: Columns, row: int, number: int, space: DesignSpace, signals:
     mep_mv, lost = columns["mep"].number(row), columns.lost(row)
     if mep_mv is not None and not 0 <= mep_mv <= MOST_MEP_MV:
         remedy = "It must be from peak to peak, in the unit that is stated; is --unit right?"
-        if by := columns.units_by[1]:
+        if mep_mv < 0:
+            remedy = columns["mep"].remedy
+        elif by := columns.units_by[1]:
             remedy = "It must be from peak to peak. If its name has the wrong unit, say the right one by --unit, and "
             remedy += f'--where "{by}={ALL}".'
         raise columns.of["mep"].refused(row, "is no amplitude", remedy)

@@ -87,7 +87,9 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         trials.append(replace(judged, excluded=is_bad or pulse.said.get("excluded") in {True, "true", "True"}))
         if trials[-1].told:
             seen.append((sweep, judged))
-    contents = replace(contents, notes=(*contents.notes, *_note_of_the_cut_off(trials)))
+    cut = sum(trial.reason is Kind.MISSING_CHANNEL for trial in trials)
+    said = f"{counted(cut, 'pulse')} of {len(trials)} came where no EMG was recorded up to the end of the MEP."
+    contents = replace(contents, notes=(*contents.notes, *([said] if cut else [])))
     if trials and not seen:
         got = ", ".join(sorted({str(trial.reason) for trial in trials if trial.reason})) or "excluded ones"
         remedy = " ".join([*contents.notes, _IF_NONE_COUNTS.format(limits.background_uv)])
@@ -109,12 +111,6 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         unused=unused,
         notes=(*contents.notes, *is_rectified(emg)),
     )
-
-
-def _note_of_the_cut_off(trials: Sequence[Trial]) -> list[str]:
-    cut = sum(trial.reason is Kind.MISSING_CHANNEL for trial in trials)
-    said = f"{counted(cut, 'pulse')} of {len(trials)} came where no EMG was recorded up to the end of the MEP."
-    return [said] if cut else []
 
 
 def _require_noise(trials: Sequence[Trial], emg: str, contents: Contents, layout: Layout) -> None:

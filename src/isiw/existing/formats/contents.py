@@ -274,9 +274,7 @@ def with_bad(events: pd.DataFrame, *but: str) -> pd.DataFrame:
         key = next((key for key in ("exclude", "status") if letters(name) in COLUMNS[key]), None)
         is_verdict = key is not None or not WORDS["counted"].isdisjoint(rows[name].astype(str).str.casefold())
         kinds = WORDS["left out"] | WORDS["yes" if key == "exclude" else "no"] if key else WORDS["left out"]
-        if not is_verdict:
-            continue
-        bad |= {row for row, cell in rows[name].items() if str(cell).casefold() in kinds}
+        bad |= {row for row, cell in rows[name].items() if is_verdict and str(cell).casefold() in kinds}
     held = [events.loc[row] for row in sorted(bad)]
     added = [(f"BAD {one['name']}", one["onset"], max(one["duration"], _LASTS_S)) for one in held]
     return pd.concat([events, events_of(added)], ignore_index=True) if added else events

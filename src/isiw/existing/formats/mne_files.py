@@ -11,10 +11,9 @@ from typing import Any, Final
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, timed, with_codes
 from isiw.existing.frames import content_of, decoded
-from isiw.existing.layout import Layout
+from isiw.existing.layout import EMG_UNITS, Layout
 from isiw.text.named_code import library
 
-_SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}  # numbers in others stay as they are
 _PAUSE: Final = re.compile(r"new segment|\bboundary\b", re.IGNORECASE)  # of unknown length, as annotations say it
 _DATE: Final = 14  # the date of a marker of BrainVision has at least so many digits
 
@@ -87,6 +86,5 @@ def _tracks(held: Any, stretches: tuple[Stretch, ...], part: Callable[[int, int,
         said = units.get(name, "V")
         usual = "" if kind == "misc" and said not in {"V", "n/a", ""} else kind
         read, unit = partial(part, index), "" if said == "n/a" else said
-        is_bad = name in held.info["bads"]
-        track = Track(str(name), float(held.info["sfreq"]), stretches, read, unit, usual, bad=is_bad)
-        yield track.scaled(1.0 / _SCALES_V.get(said, 1.0))
+        track = Track(str(name), float(held.info["sfreq"]), stretches, read, unit, usual, bad=name in held.info["bads"])
+        yield track.scaled(1e3 / EMG_UNITS.get(said, 1e3))  # numbers in other units stay as they are

@@ -58,7 +58,7 @@ def read(path: Path, _layout: Layout) -> Contents:
                        for n, (label, unit, kind) in enumerate(own.channels())]  # fmt: skip
         elif own.form.startswith(("string", "int")) or any(word in own.kind for word in _OF_MARKERS):
             noted = zip(stream["time_series"], times_s.tolist(), strict=True)
-            rows += [(text_of(*one), at, 0.0) for one, at in noted]
+            rows += [(text_of(*said), at, 0.0) for said, at in noted]
     return Contents(path.name, tuple(tracks), events_of(rows), notes=tuple(notes))
 
 
@@ -121,27 +121,21 @@ def _shortened(whole: Any, held: dict[int, _Stream]) -> Iterator[bytes]:
 
     Of a stream of numbers the footer is, too, by whose count of samples pyxdf would cut off what is shortened.
     """
-    for at, tag, content in _chunks(whole):
+    at = 4
+    while 0 <= at < len(whole):
+        begin = at + 1 + whole[at]
+        end = begin + int.from_bytes(whole[at + 1 : begin], "little")
+        if whole[at] not in {1, 4, 8} or not begin + 2 <= end <= len(whole):  # it goes on at the next boundary
+            found = whole.find(BOUNDARY, at + 1)
+            at = found + len(BOUNDARY) if found >= 0 else -1
+            continue
+        tag, content, at = int.from_bytes(whole[begin : begin + 2], "little"), whole[begin + 2 : end], end
         stream, kept = int.from_bytes(content[:4], "little"), content
         with suppress(ET.ParseError, IndexError, struct.error):  # pyxdf makes of a header what it can
             if tag == _HEADER:
                 held[stream] = _Stream(whole, content[4:])
             elif stream in held and held[stream].has_numbers and tag in {_SAMPLES, _FOOTER}:
                 kept = b""
-                kept = held[stream].shortened(at, content) if tag == _SAMPLES else b""
+                kept = held[stream].shortened(begin + 2, content) if tag == _SAMPLES else b""
         if kept:
             yield b"\x08" + (len(kept) + 2).to_bytes(8, "little") + tag.to_bytes(2, "little") + kept
-
-
-def _chunks(whole: Any) -> Iterator[tuple[int, int, bytes]]:
-    """Where the content of each chunk begins, its tag, and its content; after damage, from the next boundary on."""
-    at = 4
-    while 0 <= at < len(whole):
-        begin = at + 1 + whole[at]
-        end = begin + int.from_bytes(whole[at + 1 : begin], "little")
-        if whole[at] in {1, 4, 8} and begin + 2 <= end <= len(whole):
-            yield begin + 2, int.from_bytes(whole[begin : begin + 2], "little"), whole[begin + 2 : end]
-            at = end
-        else:
-            found = whole.find(BOUNDARY, at + 1)
-            at = found + len(BOUNDARY) if found >= 0 else -1
