@@ -26,7 +26,7 @@ class PulseLimits(Checked):
         period_s: length of that period [s].
         max_coil_c: highest temperature of the coil at which to deliver [°C]; the device must report it.
         intensity_pct_mso: the only intensity at which to deliver [% of the maximum stimulator output]; the device must
-            report it. Where None, one that is reported has to be the visit's, or else that at staging.
+            report it. Where None, one that is reported has to be the visit's, or else the first one.
         max_consecutive_mistrials: a session pauses after so many rejected trials, or of a faulty rig, in a row.
         max_intensity_pct_rmt: the highest intensity that a device may be asked to set [% RMT]; None if it may be asked
             to set none. Where one is stated, a reported intensity may change from pulse to pulse.
@@ -65,6 +65,16 @@ class PulseLimits(Checked):
     def looks_back(self) -> bool:
         """True if it matters when earlier stimuli came, before the last interval."""
         return self.max_block_pulses is not None or self.max_period_pulses is not None
+
+    @property
+    def looks_back_s(self) -> float:
+        """How old an earlier stimulus may be that still matters [s]: a block is over in less than a rest for each."""
+        return max(self.period_s, self.rest_s * (self.max_block_pulses or 1))
+
+    @property
+    def binds_no_intensity(self) -> bool:
+        """True if neither an only intensity is named nor a highest one."""
+        return self.intensity_pct_mso is None and self.max_intensity_pct_rmt is None
 
     def stated(self, iti_s: float) -> Self:
         """The same with this interval [s], unless another one is stated."""
