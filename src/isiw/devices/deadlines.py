@@ -115,7 +115,7 @@ class _Worker:
 
 
 _abandoned: list[tuple[Device, str, _Call[Any]]] = []
-"""Verbs of any session that were given up and may still be busy: each may yet arm the device at its address, or fire."""
+"""Verbs of any session that were given up and may still be busy: each may yet arm what is at its address, or fire."""
 
 _looking = threading.Lock()
 
