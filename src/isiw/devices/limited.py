@@ -166,13 +166,17 @@ class LimitedDevice:
         self._device.stage()
         self._pacing.begin_again()
         self._last_set_pct_rmt = None
-        if self._limits.binds_no_intensity:
+        if self._binds_none:
             self._bind(readiness_of(self._device))
         self._staged = True
 
+    @property
+    def _binds_none(self) -> bool:
+        return self._limits.intensity_pct_mso is None and self._limits.max_intensity_pct_rmt is None
+
     def _bind(self, state: Readiness) -> None:
         """Let no other intensity follow than the visit's, or else the first one that is reported, at whatever time."""
-        if self._limits.binds_no_intensity and state.intensity_pct_mso is not None:
+        if self._binds_none and state.intensity_pct_mso is not None:
             own = self._noted.intensity_pct_mso or state.intensity_pct_mso
             self._limits = dataclasses.replace(self._limits, intensity_pct_mso=own)
 

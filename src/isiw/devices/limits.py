@@ -66,16 +66,6 @@ class PulseLimits(Checked):
         """True if it matters when earlier stimuli came, before the last interval."""
         return self.max_block_pulses is not None or self.max_period_pulses is not None
 
-    @property
-    def looks_back_s(self) -> float:
-        """How old an earlier stimulus may be that still matters [s]: a block is over in less than a rest for each."""
-        return max(self.period_s, self.rest_s * (self.max_block_pulses or 1))
-
-    @property
-    def binds_no_intensity(self) -> bool:
-        """True if neither an only intensity is named nor a highest one."""
-        return self.intensity_pct_mso is None and self.max_intensity_pct_rmt is None
-
     def stated(self, iti_s: float) -> Self:
         """The same with this interval [s], unless another one is stated."""
         return replace(self, min_iti_s=iti_s) if self.min_iti_s is None else self

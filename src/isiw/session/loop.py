@@ -280,7 +280,9 @@ class Session(Judging):
             return []
         found = [self._earlier.ages()]
         if folder is not None:
-            found.append(earlier_pulse_ages(folder, self._header.subject, limits.looks_back_s, but=self.log_path))
+            # A block is over in less than a rest for each of its stimuli.
+            most_s = max(limits.period_s, limits.rest_s * (limits.max_block_pulses or 1))
+            found.append(earlier_pulse_ages(folder, self._header.subject, most_s, but=self.log_path))
         for doubt in dict.fromkeys(doubt for ages in found for doubt in ages.doubts):
             warn(doubt, ClockWarning)
             self._sink.faults.append(doubt)
