@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Never, TypeAlias
 
 import pytest
@@ -216,6 +217,10 @@ def test_nobody_arms_a_device_while_a_delivery_that_was_given_up_may_yet_fire(re
     staged = []
 
     class Hanging(ScriptedDevice):
+        def __init__(self) -> None:
+            super().__init__()
+            self.info = replace(self.info, address="COM3")
+
         def stage(self) -> None:
             staged.append(released.is_set())
 
@@ -229,7 +234,8 @@ def test_nobody_arms_a_device_while_a_delivery_that_was_given_up_may_yet_fire(re
     wrapped.stage()
     with pytest.raises(DeviceTimeoutError):
         wrapped.deliver(STIMULUS, SHORT_S)
-    for again in (wrapped, PunctualDevice(device, deadlines)):  # after a pause, and in another session
+    in_other_sessions = (PunctualDevice(device, deadlines), PunctualDevice(Hanging(), deadlines))
+    for again in (wrapped, *in_other_sessions):  # after a pause, and with an object of its own, too
         with pytest.raises(DeviceError, match="could still fire"):
             again.stage()
     released.set()

@@ -297,6 +297,24 @@ def test_the_intensity_at_staging_is_locked_also_when_it_is_staged_again(
     assert inner.delivered == []
 
 
+@pytest.mark.parametrize(("noted", "delivered"), [(None, 1), (60.0, 0)])
+def test_an_intensity_that_is_reported_only_after_staging_binds_as_well(
+    inner: ScriptedDevice, clock: VirtualClock, noted: float | None, delivered: int
+) -> None:
+    device = Reporting(inner, Readiness())
+    limited = LimitedDevice(device, LIMITS, clock, noted=Visit(intensity_pct_mso=noted))
+    limited.stage()
+    device.state = Readiness(intensity_pct_mso=55.0)
+    for _ in range(delivered):
+        clock.sleep_s(limited.wait_s())
+        limited.deliver(Stimulus(0, 10), 1.0)
+    device.state = Readiness(intensity_pct_mso=61.0)
+    clock.sleep_s(limited.wait_s())
+    with pytest.raises(LimitExceededError, match=r"61 % MSO.*(55|60) % MSO"):
+        limited.deliver(Stimulus(0, 10), 1.0)
+    assert len(inner.delivered) == delivered
+
+
 def test_an_intensity_is_the_same_up_to_what_a_conversion_loses(inner: ScriptedDevice, clock: VirtualClock) -> None:
     device, limited = reporting(inner, clock, Readiness(intensity_pct_mso=55.0))
     device.state = Readiness(intensity_pct_mso=55.000001)

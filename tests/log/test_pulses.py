@@ -7,6 +7,7 @@ import os
 import shutil
 import time
 from collections.abc import Container
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -290,3 +291,13 @@ def test_imported_trials_count_as_of_their_own_dates_and_without_these_as_of_the
         for trial in range(3):
             log.append(Trial(trial, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=0.1))
     assert len(earlier(tmp_path)) == count
+
+
+def test_tables_of_one_date_count_each_and_one_that_was_imported_twice_once(tmp_path: Path, header: Header) -> None:
+    then = datetime.fromtimestamp(time.time() - 100.0, UTC).isoformat()
+    imported = header.model_copy(update={"kind": "imported", "source": "table.csv", "given_by": then})
+    for name, isi_ms in {"morning": 50.0, "noon": 60.0, "noon again": 60.0}.items():
+        with LogWriter.create(tmp_path / f"{name}.mcap", imported) as log:
+            for trial in range(3):
+                log.append(Trial(trial, Status.ACCEPTED, isi_ms, isi_ms=isi_ms, mep_mv=0.1))
+    assert len(earlier(tmp_path)) == 6

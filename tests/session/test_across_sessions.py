@@ -19,6 +19,7 @@ from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.rig import Safeguards
 from isiw.trials import Status, Trial
+from isiw.visit import VisitProtocol
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy
 
 LIMITS = Limits(0, 200, min_iti_s=5.0, max_pulses=100, max_period_pulses=5, period_s=3600.0)
@@ -57,6 +58,19 @@ def test_earlier_sessions_of_the_subject_count_for_the_period(session: MakeSessi
     times_s = [intent.t_s for intent in read_session(tmp_path / "b.mcap").intents]
     assert times_s[:2] == [last_s + 5.0, last_s + 10.0]  # the fourth and the fifth of the period
     assert times_s[2] > last_s + 3000.0
+
+
+def test_a_block_of_earlier_sessions_counts_however_long_it_took(
+    session: MakeSession, tmp_path: Path, clock: FakeRealClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real_ns = time.time_ns()
+    monkeypatch.setattr(moments, "boot_s", clock.now_s)
+    monkeypatch.setattr(time, "time_ns", lambda: real_ns + round(1e9 * clock.now_s()))
+    limits = Limits(0, 200, min_iti_s=5.0, max_block_pulses=4, rest_s=120.0, period_s=120.0)
+    session("a.mcap", limits=limits, protocol=VisitProtocol(iti_s=(100.0, 100.0))).run()
+    session("b.mcap", limits=limits).run()
+    last_s = read_session(tmp_path / "a.mcap").intents[-1].t_s
+    assert [intent.t_s - last_s for intent in read_session(tmp_path / "b.mcap").intents] == [5.0, 125.0, 130.0]
 
 
 def test_sessions_of_other_subjects_do_not_count(session: MakeSession, tmp_path: Path) -> None:

@@ -19,7 +19,12 @@ class Operated:
 
     def __init__(self, *trials: Trial) -> None:
         self.trials = TrialTable(trials)
+        self.hidden: set[int] = set()
         self.done: list[tuple[object, ...]] = []
+
+    @property
+    def shown_trials(self) -> TrialTable:
+        return TrialTable(tuple(trial for trial in self.trials if trial.index not in self.hidden))
 
     @property
     def last_excluded(self) -> int | None:
@@ -74,6 +79,21 @@ def test_keys_mean_the_trial_on_the_screen_not_one_delivered_since() -> None:
     console.shown = 2
     press(console, "j")
     assert session.done[-1] == ("reject", 2)
+
+
+def test_keys_mean_no_trial_before_those_that_would_show_the_arm(capsys: pytest.CaptureFixture[str]) -> None:
+    session = Operated(trial(0), trial(1), trial(2))
+    session.hidden = {1, 2}
+    console = OperatorConsole(session)
+    console.shown = 0
+    press(console, "x")
+    console.leave()
+    with shown(console, capsys) as lines:
+        assert not console.goes_on("A look.")
+    assert not [line for line in lines if "its row appears" in line]
+    session.trials = TrialTable((*session.trials, trial(3)))
+    press(console, "j")
+    assert session.done == [("exclude", 2, "Excluded by the operator."), ("reject", 2)]
 
 
 def test_where_no_row_is_shown_keys_mean_the_last_trial() -> None:

@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Never, cast
@@ -25,6 +26,7 @@ from isiw.log.schema import EstimateRecord, Intent
 from isiw.models.particles import ParticleModel
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
+from isiw.session.state import State
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.recipe import Recipe
@@ -197,6 +199,16 @@ def test_an_isi_beyond_the_limits_is_never_delivered(log: Path) -> None:
     assert "beyond the limits" in message
     assert [event.kind for event in record.events] == ["limit"]
     assert record.finished
+
+
+@pytest.mark.parametrize("press", [Session.pause, Session.end])
+def test_what_is_paused_or_ended_before_it_is_armed_is_not_armed(log: Path, press: Callable[..., None]) -> None:
+    device = ScriptedDevice()
+    session = Session(device, scripted_strategy(), log=log)
+    press(session, "Not yet.")
+    assert not session.run().decision.stop
+    assert "stage" not in device.calls
+    assert session.state is State.ENDED
 
 
 def test_the_device_is_always_stopped(log: Path) -> None:

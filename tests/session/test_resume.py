@@ -110,18 +110,22 @@ def test_earlier_stimuli_count_against_the_limits(interrupted: Path, space: Desi
 
 
 class Stimulator(ScriptedDevice):
-    """Reports its intensity."""
+    """Reports its intensity, which it does not know the first few times."""
 
     intensity_pct_mso = 60.0
+    silent = 0
 
     def readiness(self) -> Readiness:
-        return Readiness(intensity_pct_mso=self.intensity_pct_mso)
+        self.silent -= 1
+        return Readiness(intensity_pct_mso=None if self.silent >= 0 else self.intensity_pct_mso)
 
 
+@pytest.mark.parametrize("silent", [0, 1])
 def test_the_intensity_that_a_session_began_with_is_locked_also_when_it_is_resumed(
-    log: Path, space: DesignSpace
+    log: Path, space: DesignSpace, silent: int
 ) -> None:
     stimulator = Stimulator()
+    stimulator.silent = silent
     with pytest.raises(LimitExceededError, match="85 % MSO"):
         Session(
             stimulator,

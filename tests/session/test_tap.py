@@ -55,6 +55,19 @@ def test_three_taps_alone_follow_on_the_first_four_trials_and_use_up_no_budget(l
     assert {trial.tap_mv is None for trial in session.trials.trials[7:]} == {False}
 
 
+def test_a_verdict_that_comes_while_a_stimulus_is_chosen_mixes_no_two(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks = itertools.cycle((True, False, False))  # as where a verdict comes between any two
+    monkeypatch.setattr(steps.OwnResponse, "wants_tap", property(lambda _: next(looks)))
+    rig = TapRig()
+    ran(rig, log, few(2))
+    assert {(stimulus.tap_alone, stimulus.isi_ms is None) for stimulus in rig.delivered} == {
+        (True, True),
+        (False, False),
+    }
+
+
 def test_more_taps_alone_follow_while_a_window_is_found_that_the_response_could_explain() -> None:
     rig, trials = TapRig(reflex(0.3)), TrialTable()
     for isi_ms in (None, None, None, 20.0, 30.0, 100.0, 20.0):

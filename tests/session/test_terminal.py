@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from isiw.session.terminal import ERASED, Keys, Screen, drop_typed_ahead, typed
+from isiw.session.terminal import ERASED, Keys, Screen, drop_typed_ahead, goes_on, typed
 
 
 def seen(written: str) -> list[str]:
@@ -137,4 +137,25 @@ def test_what_was_typed_before_a_question_is_no_answer_to_it(monkeypatch: pytest
         drop_typed_ahead()
         os.write(operator, b"0.05\n")
         assert stdin.readline() == "0.05\n"
+    os.close(operator)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX terminals")
+def test_a_yes_that_was_typed_before_a_pause_does_not_continue_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    operator, terminal = os.openpty()
+    asked = threading.Event()
+
+    def ask(*_: object, **__: object) -> None:
+        asked.set()
+        os.write(operator, b"n\n")
+
+    with os.fdopen(terminal, encoding="utf-8") as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        monkeypatch.setattr("isiw.session.terminal.is_terminal", lambda _: True)  # what pytest captures is none
+        monkeypatch.setattr("isiw.session.terminal.alarm", ask)
+        os.write(operator, b"y\n")
+        while not select.select([terminal], [], [], 0.1)[0]:
+            pass
+        assert not goes_on("The MEPs have gone.")
+    assert asked.is_set()
     os.close(operator)

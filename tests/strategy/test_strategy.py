@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import itertools
 import math
+import sys
 import warnings
 from dataclasses import dataclass
+from types import FrameType
 from typing import Any, cast
 
 import numpy as np
@@ -17,6 +20,7 @@ from isiw.decision import StopDecision
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.dissertation.strategies import Settling
 from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
+from isiw.findings import Kind
 from isiw.models.protocol import Posterior
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.decisions import Progress
@@ -24,7 +28,7 @@ from isiw.strategy.recipe import Recipe
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
 from isiw.testing.suites import same_estimates
-from isiw.trials import Trial
+from isiw.trials import Status, Trial
 from isiw.types import Array
 from known import known
 from scripted import scripted_strategy
@@ -522,3 +526,53 @@ def test_a_batch_begins_with_what_is_asked_also_where_trials_were_lost() -> None
     for _ in range(3):
         strategy.count_mistrial()
     assert strategy.ask_batch(2)[0] == strategy.ask()
+
+
+def interrupted_at(call: int, strategy: Strategy, trial: Trial) -> bool:
+    """Whether learning a trial was interrupted, at the entry into a function or behind one, as by Ctrl-C."""
+    left = itertools.count(call, -1)
+
+    def look(frame: FrameType, event: str, _: object) -> None:
+        # A generator that is thrown away says of an error in it that it is ignored.
+        if event in {"call", "c_return"} and not frame.f_code.co_flags & inspect.CO_GENERATOR and next(left) == 0:
+            sys.setprofile(None)
+            raise KeyboardInterrupt
+
+    before = sys.getprofile()
+    sys.setprofile(look)
+    try:
+        strategy.learn(trial)
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.setprofile(before)
+    return False
+
+
+LOST = Trial(9, Status.MISTRIAL, 50.0, Kind.OUTCOME_UNKNOWN)
+
+
+@pytest.mark.parametrize(
+    "trial",
+    [Trial.of(50.0, 0.3), Trial.of(None, 0.1), Trial(9, Status.ACCEPTED, None, mep_mv=0.1, tap_alone=True), LOST],
+)
+def test_a_trial_is_learnt_wholly_or_not_at_all_wherever_ctrl_c_comes(trial: Trial) -> None:
+    def told() -> Strategy:
+        strategy = scripted_strategy(20)
+        for before in (Trial.of(80.0, 0.2), LOST, LOST):
+            strategy.ask()
+            strategy.learn(before)
+        return strategy
+
+    once = told()
+    once.learn(trial)
+    for call in itertools.count():
+        strategy = told()
+        interrupted = interrupted_at(call, strategy, trial)
+        if strategy.delivered < once.delivered:
+            strategy.learn(trial)
+        assert vars(strategy)["_outcomes"] == vars(once)["_outcomes"]
+        assert (strategy.ask(), strategy.spent) == (once.ask(), once.spent)
+        if not interrupted:
+            break
+    assert call > 5

@@ -114,17 +114,17 @@ class _Worker:
             call.run()
 
 
-_abandoned: list[tuple[Device, _Call[Any]]] = []
-"""Verbs of any session that were given up and may still be busy: each may yet arm its device, or fire."""
+_abandoned: list[tuple[Device, str, _Call[Any]]] = []
+"""Verbs of any session that were given up and may still be busy: each may yet arm what is at its address, or fire."""
 
 _looking = threading.Lock()
 
 
-def _abandoned_of(device: Device) -> list[_Call[Any]]:
-    """The calls of a device that were given up and are still busy; a device need not be hashable."""
+def _abandoned_of(device: Device, address: str) -> list[_Call[Any]]:
+    """The calls of a device that were given up and are still busy, also of another object of the same address."""
     with _looking:
-        _abandoned[:] = [(whose, call) for whose, call in _abandoned if not call.ended]
-        return [call for whose, call in _abandoned if whose is device]
+        _abandoned[:] = [each for each in _abandoned if not each[2].ended]
+        return [call for whose, at, call in _abandoned if whose is device or (at and at == address)]
 
 
 class PunctualDevice:
@@ -145,7 +145,7 @@ class PunctualDevice:
     ) -> None:
         self._device, self._deadlines = device, deadlines or Deadlines()
         self._given_up, self._report, self._still_armed = given_up, report, still_armed
-        self._name = type(device).__name__
+        self._name, self._address = type(device).__name__, ""
         self._stopping = threading.RLock()
         # Whether it was ever staged; and since the last time, whether it was stopped, and that with no other verb busy.
         self._staged = self._stopped = self._disarmed = False
@@ -153,7 +153,7 @@ class PunctualDevice:
         self._worker: _Worker | None = None
         self._owner = threading.get_ident()
         self._info = self._within("describe", partial(info_of, device), self._deadlines.describe_s)
-        self._name = self._info.name
+        self._name, self._address = self._info.name, self._info.address
 
     def describe(self) -> DeviceInfo:
         """The description of the device, as it was at first."""
@@ -161,10 +161,10 @@ class PunctualDevice:
 
     def stage(self) -> None:
         """Get ready and arm."""
-        for call in _abandoned_of(self._device):
+        for call in self._abandoned:
             call.wait(call.age_s + self._deadlines.stop_s)
         with self._stopping:  # else a `stop` that comes meanwhile would take the device for disarmed
-            if _abandoned_of(self._device):
+            if self._abandoned:
                 raise DeviceError(
                     "the device was not armed: an earlier call, for which isiw no longer waits, is still running and "
                     "could still fire",
@@ -228,8 +228,12 @@ class PunctualDevice:
         )
 
     @property
+    def _abandoned(self) -> list[_Call[Any]]:
+        return _abandoned_of(self._device, self._address)
+
+    @property
     def _idle(self) -> bool:
-        return not _abandoned_of(self._device) and (self._worker is None or self._worker.idle)
+        return not self._abandoned and (self._worker is None or self._worker.idle)
 
     def unstage(self) -> None:
         """Let go of what `stage` took."""
@@ -279,7 +283,7 @@ class PunctualDevice:
         if self._worker is not None:
             late = self._worker.begin(self._stop_late)
             with _looking:
-                _abandoned.append((self._device, late))
+                _abandoned.append((self._device, self._address, late))
         self.release_thread()
 
     def _stop_late(self) -> None:

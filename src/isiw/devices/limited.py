@@ -134,6 +134,7 @@ class LimitedDevice:
                 f"the device is not ready: {state.reason or 'it does not say why'}",
                 remedy="This stimulus was not delivered. Continue when the device is ready.",
             )
+        self._bind(state)
         require_state(self._limits, state.coil_c, state.intensity_pct_mso)
         require_set(self._noted, self._last_set_pct_rmt, state)
         if self._dead_man is not None and self._dead_man() is not True:
@@ -165,11 +166,19 @@ class LimitedDevice:
         self._device.stage()
         self._pacing.begin_again()
         self._last_set_pct_rmt = None
-        if self._limits.intensity_pct_mso is None and self._limits.max_intensity_pct_rmt is None:
-            reported = readiness_of(self._device).intensity_pct_mso
-            own = reported if reported is None else self._noted.intensity_pct_mso or reported
-            self._limits = dataclasses.replace(self._limits, intensity_pct_mso=own)
+        if self._binds_none:
+            self._bind(readiness_of(self._device))
         self._staged = True
+
+    @property
+    def _binds_none(self) -> bool:
+        return self._limits.intensity_pct_mso is None and self._limits.max_intensity_pct_rmt is None
+
+    def _bind(self, state: Readiness) -> None:
+        """Let no other intensity follow than the visit's, or else the first one that is reported, at whatever time."""
+        if self._binds_none and state.intensity_pct_mso is not None:
+            own = self._noted.intensity_pct_mso or state.intensity_pct_mso
+            self._limits = dataclasses.replace(self._limits, intensity_pct_mso=own)
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
         """Deliver one pair of stimuli, if the limits allow it."""

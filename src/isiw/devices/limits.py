@@ -26,7 +26,7 @@ class PulseLimits(Checked):
         period_s: length of that period [s].
         max_coil_c: highest temperature of the coil at which to deliver [°C]; the device must report it.
         intensity_pct_mso: the only intensity at which to deliver [% of the maximum stimulator output]; the device must
-            report it. Where None, one that is reported has to be the visit's, or else that at staging.
+            report it. Where None, one that is reported has to be the visit's, or else the first one.
         max_consecutive_mistrials: a session pauses after so many rejected trials, or of a faulty rig, in a row.
         max_intensity_pct_rmt: the highest intensity that a device may be asked to set [% RMT]; None if it may be asked
             to set none. Where one is stated, a reported intensity may change from pulse to pulse.

@@ -7,6 +7,7 @@ its clock is trusted, unless that says that a stimulus is still to come: then it
 from __future__ import annotations
 
 import datetime as dt
+import hashlib
 import math
 import os
 from collections.abc import Iterable, Iterator
@@ -43,10 +44,11 @@ _HEAD_BYTES: Final = 1 << 18
 
 
 class Given(NamedTuple):
-    """A stimulus that was about to be delivered: its number, and when that was."""
+    """A stimulus that was about to be delivered: its number, when that was, and where it was imported all trials."""
 
     trial: int
     at: Moment
+    table: bytes = b""
 
 
 def pulse_ages(salvaged: Salvage, now: Moment | None = None) -> Ages:
@@ -210,12 +212,13 @@ def _of_subject(log: Path, subject: str) -> tuple[str, list[Given]]:
             remedy="Resume that session with the number of pulses that were lost, or wait until the period is over.",
         )
     given = _given(salvaged)
-    return header.subject, _dated(given, header) if isinstance(header, Header) and header.imported else given
+    if not isinstance(header, Header) or not header.imported or not header.given_by:
+        return header.subject, given
+    table = b"".join(message.data for message in salvaged.messages if message.topic == "/trial")
+    return header.subject, _dated(given, header.given_by, hashlib.sha256(table).digest())
 
 
-def _dated(given: Iterable[Given], header: Header) -> list[Given]:
-    """The stimuli of an imported log by the dates of their data, and not later than they were imported."""
-    if not header.given_by:
-        return list(given)
-    latest_ns = round(dt.datetime.fromisoformat(header.given_by).timestamp() * 1e9)
-    return [Given(each.trial, Moment(min(latest_ns, each.at.wall_ns))) for each in given]
+def _dated(given: Iterable[Given], given_by: str, table: bytes) -> list[Given]:
+    """The stimuli of an imported log by the last date of its data, which other tables may share, or its import."""
+    latest_ns = round(dt.datetime.fromisoformat(given_by).timestamp() * 1e9)
+    return [Given(each.trial, Moment(min(latest_ns, each.at.wall_ns)), table) for each in given]

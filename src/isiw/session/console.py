@@ -132,6 +132,8 @@ class _Operated(Protocol):
     @property
     def trials(self) -> TrialTable: ...
     @property
+    def shown_trials(self) -> TrialTable: ...
+    @property
     def last_excluded(self) -> int | None: ...
     def pause(self, reason: str) -> None: ...
     def note(self, text: str) -> None: ...
@@ -185,7 +187,7 @@ class OperatorConsole:
         """Wait for the key that says whether a paused session goes on."""
         way_on = "q ends the intervention for good" if self.final else "q ends the session; it can be resumed later"
         self.screen.say(f"{State.PAUSED}: {reason} The device is disarmed. r continues, {way_on}.")
-        if self.shown is not None and self.shown != (last := self._session.trials[-1].index):
+        if self.shown is not None and self._meant != (last := self._session.trials[-1].index):
             self.shown = last
             self.screen.say(
                 f"Trial {last} was delivered; its row appears when the session continues. x, a and j now act on "
@@ -240,9 +242,19 @@ class OperatorConsole:
     def _judge(self, say: Callable[..., None], outcome: str, *reason: str) -> None:
         if not self._session.trials:
             raise InvalidValueError("there is no trial yet")
-        number = self._session.trials[-1].index if self.shown is None else self.shown
+        number = self._meant
         say(number, *reason)
         self.screen.say(f"Trial {number} {outcome}.")
+
+    @property
+    def _meant(self) -> int:
+        """The trial of the last row, or a later one that gets none as it would show the arm; the last without rows."""
+        if self.shown is None:
+            return self._session.trials[-1].index
+        given, rows = (
+            {trial.index for trial in trials} for trials in (self._session.trials, self._session.shown_trials)
+        )
+        return max({self.shown} | given - rows)
 
     def _undo(self) -> None:
         if (number := self._session.last_excluded) is None:

@@ -102,9 +102,9 @@ class Session(Judging):
     @property
     def state(self) -> State:
         """The state of the session, in the word that people read."""
-        wait = self.wait
+        wait, was_paused = self.wait, self._asking.over or self._asking.number > 0
         return state_of(
-            begun=self._rig.staged_once or bool(self._earlier.first_records) or self._fault is not None,
+            begun=self._rig.staged_once or bool(self._earlier.first_records) or self._fault is not None or was_paused,
             running=self.running,
             paused=self.pause_waiting is not None,
             rests=wait is not None and wait.rests,
@@ -181,8 +181,8 @@ class Session(Judging):
                 self._take_up_blocks()
                 decision = self._steps.at_the_end()  # of a session that was resumed; it need not be armed for nothing
                 if decision is None:
-                    with self._operated(keys=keys) as decide, self._rig.armed():
-                        self._log_locked_limits()
+                    arms = self._pausing.reason is None  # else Pause or Stop was pressed already
+                    with self._operated(keys=keys) as decide, self._rig.armed(at_once=arms):
                         decision = self._loop(decide)
                 self._examination.log_faults()
             except BaseException as error:
@@ -280,15 +280,16 @@ class Session(Judging):
             return []
         found = [self._earlier.ages()]
         if folder is not None:
-            period_s = max(limits.period_s, limits.rest_s)
-            found.append(earlier_pulse_ages(folder, self._header.subject, period_s, but=self.log_path))
+            # A block is over in less than a rest for each of its stimuli.
+            most_s = max(limits.period_s, limits.rest_s * (limits.max_block_pulses or 1))
+            found.append(earlier_pulse_ages(folder, self._header.subject, most_s, but=self.log_path))
         for doubt in dict.fromkeys(doubt for ages in found for doubt in ages.doubts):
             warn(doubt, ClockWarning)
             self._sink.faults.append(doubt)
         return [age_s for ages in found for age_s in ages.ages_s]
 
     def _log_locked_limits(self) -> None:
-        """Log the intensity that the device reported when it was armed, so that a resumed session is held to it."""
+        """Log the intensity that the device reported first, so that a resumed session is held to it."""
         limits, intervention = self._rig.limited.limits, self._header.intervention
         if limits != self._header.limits:
             if intervention is not None:
@@ -309,6 +310,7 @@ class Session(Judging):
     def _loop(self, decide: Callable[[str], bool]) -> StopDecision:
         decision = None
         while decision is None or not decision.stop or self._examination.overruled:
+            self._log_locked_limits()
             if self._pausing.due:
                 if (reason := self._pausing.until_decided(decide)) is not None:
                     self._log_stop(reason)

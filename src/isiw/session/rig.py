@@ -213,10 +213,11 @@ class Rig:
             yield
 
     @contextmanager
-    def armed(self) -> Iterator[None]:
-        """Within, the device is staged; behind it, it is disarmed and let go of, whatever happened."""
+    def armed(self, *, at_once: bool = True) -> Iterator[None]:
+        """Within, the device is staged, or may be later; behind it, it is disarmed and let go of, whatever happened."""
         try:
-            self.stage()
+            if at_once:
+                self.stage()
             yield
         except BaseException as error:
             self._release(error)

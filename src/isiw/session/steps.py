@@ -232,10 +232,9 @@ class Steps:
         number = len(self._examination.trials)
         if self._blocks is not None and not self._announced(self._blocks, number):
             return None
-        control, isi_ms = self._next_control, self._next_isi_ms()
-        stimulus = Stimulus(
-            number, isi_ms, control is Control.TAP_ALONE, set_for(control, self._strategy, self._header)
-        )
+        control = self._next_control  # looked at once: a verdict may come at any time, and change it
+        isi_ms, is_tap = self._next_isi_ms(control), control is Control.TAP_ALONE
+        stimulus = Stimulus(number, isi_ms, is_tap, set_for(control, self._strategy, self._header))
         for backoff_s in self._backoffs_s:
             try:
                 return self._deliver_in_time(stimulus)
@@ -269,9 +268,9 @@ class Steps:
             return Control.TAP_ALONE
         return schedule.control(self._header.protocol, len(self._examination.trials), self._header.seed)
 
-    def _next_isi_ms(self) -> float | None:
+    def _next_isi_ms(self, control: Control | None) -> float | None:
         """The next ISI [ms]; None if a control trial comes next."""
-        if self._next_control:
+        if control:
             return None
         if self._agenda is not None:
             return float(self._freely(self._agenda.isi_ms, self._examination.trials))
@@ -283,7 +282,7 @@ class Steps:
         """The same for those who look on; None if it is to stay concealed."""
         intervention = self._header.intervention
         hidden = intervention is not None and intervention.hides(len(self._examination.trials))
-        return None if hidden else self._next_isi_ms()
+        return None if hidden else self._next_isi_ms(self._next_control)
 
     def _deliver_in_time(self, stimulus: Stimulus) -> None:
         self._freely(self._wait)

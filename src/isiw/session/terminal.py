@@ -266,6 +266,7 @@ def goes_on(reason: str) -> bool:
     """Ask in the terminal whether to go on; no, if there is no terminal."""
     if not (is_terminal(sys.stdin) and is_terminal(sys.stderr)):
         return False
+    drop_typed_ahead()  # an earlier y arms nothing
     alarm(f"\n{reason} The device is disarmed. Continue? [y/N] ", end="")
     return sys.stdin.readline().strip().lower() in {"y", "yes"}
 

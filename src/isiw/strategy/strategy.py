@@ -293,9 +293,9 @@ class Strategy:
         elif trial.counts and trial.isi_ms is not None and trial.mep_mv is not None:
             self._learn_tap(trial.isi_ms, trial.mep_mv)
         elif trial.is_control:
-            self._controls += 1
             if trial.counts and trial.mep_mv is not None:  # what a tap alone evoked, at any time
                 self._outcomes = self._outcomes.after_tap(None, trial.mep_mv)
+            self._controls += 1
         elif trial.excluded and trial.reason is None:  # it was not lost
             self._mistrials, self._lost = self._mistrials + 1, 0
         else:
@@ -342,10 +342,10 @@ class Strategy:
         """Learn from one trial, wherever its ISI lies."""
         outcomes, course = self._outcomes.after(outcome), self._course
         same = outcomes.step_mv == self._outcomes.step_mv
-        learnt = course.after(outcomes.observation(outcome)) if same else None
-        self._course = learnt or course.again(self.seed, outcomes.observations)
-        self._outcomes, self._asked = outcomes, self._asked.after(outcome.isi_ms)
-        self._lost = 0 if outcome.isi_ms is not None else self._lost
+        learnt = course.after(outcomes.observation(outcome)) if same else course.again(self.seed, outcomes.observations)
+        lost, asked = self._lost if outcome.isi_ms is None else 0, self._asked.after(outcome.isi_ms)
+        # Without a call between, at which Ctrl-C may come: a trial is learnt wholly or not at all.
+        self._course, self._outcomes, self._asked, self._lost = learnt, outcomes, asked, lost
 
     def _tell_tap(self, isi_ms: float | None, mep_mv: float | None) -> None:
         if isi_ms is None or mep_mv is None:
@@ -373,13 +373,14 @@ class Strategy:
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus without an outcome: it uses up budget, and its ISI is repeated at most twice."""
-        self._mistrials, self._lost = self._mistrials + 1, self._lost + 1
+        mistrials, lost = self._mistrials + 1, self._lost + 1
         choice = None if self.choice is None else replace(self.choice, by="again")
-        self._asked = replace(self._asked, choice=choice)
-        other = instead_of_lost(self.space, self._lost, self._course.told + self._mistrials)
+        asked = replace(self._asked, choice=choice)
+        other = instead_of_lost(self.space, lost, self._course.told + mistrials)
         if other is not None and not self._course.plans_ahead:
             other = self.intensities.in_turn(other, self._course.paired_trials)
-            self._asked, self._lost = replace(self._asked, choice=other, fallback=other.fallback), 0
+            asked, lost = replace(asked, choice=other, fallback=other.fallback), 0
+        self._mistrials, self._lost, self._asked = mistrials, lost, asked
 
     @property
     def _known(self) -> Known:

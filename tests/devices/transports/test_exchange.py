@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from isiw.devices.transports.exchange import Exchange, Reply, Request, Verb
-from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered
+from isiw.devices.transports.exchange import Exchange, Reply, Request, Verb, described
+from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.trials import Stimulus
 
 SAID = {Verb.ARM: "armed", Verb.DELIVER: "delivered", Verb.DISARM: "disarmed"}
@@ -100,3 +100,11 @@ def test_it_may_be_armed_until_somebody_says_otherwise() -> None:
 def test_a_value_that_is_no_number_is_told_with_its_source(values: dict[str, object], words: str) -> None:
     with pytest.raises(DeviceError, match=f"^answer.txt: {words}"):
         Reply(values, "answer.txt").whole("trial")
+
+
+def test_a_device_that_is_told_no_intensity_does_not_claim_to_set_one() -> None:
+    assert "intensity" not in str(
+        Request("t", 1, Verb.DELIVER, 1.0, Stimulus(0, 50.0, intensity_pct_rmt=110.0)).values()
+    )
+    with pytest.raises(InvalidValueError, match="the intensity of a pulse"):
+        described({"name": "rig", "reference": "impact", "sets_intensity": True})

@@ -377,3 +377,9 @@ def test_an_answer_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
         made.stage()
     hostile.join()
     assert "password" not in str(raised.value)
+
+
+def test_a_folder_of_two_names_is_one_device(tmp_path: Path) -> None:
+    (tmp_path / "rig").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "rig")
+    assert device(tmp_path / "link").describe().address == device(tmp_path / "rig").describe().address

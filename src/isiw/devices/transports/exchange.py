@@ -292,7 +292,14 @@ def sweep_of(channels: Mapping[str, Channel], t_tms_ms: float, reply: Reply) -> 
 
 def described(info: DeviceInfo | Mapping[str, Any], **known: Any) -> DeviceInfo:
     """A device's description, from a table of a configuration or from the object."""
-    return dataclasses.replace(from_table(DeviceInfo, info, "info"), **known)
+    stated = from_table(DeviceInfo, info, "info")
+    if stated.sets_intensity:
+        raise InvalidValueError(
+            "this device cannot be told the intensity of a pulse, so each would have the one that is set",
+            got="sets_intensity in info",
+            remedy="Leave it out, and have one intensity; only a device of your own can set several.",
+        )
+    return dataclasses.replace(stated, **known)
 
 
 def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:

@@ -7,6 +7,7 @@ stopped; it names the file of its answer. Both are lines of `key=value` and then
 from __future__ import annotations
 
 import io
+import os
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -62,7 +63,7 @@ class FolderDevice:
         poll_s: float = 0.01,
     ) -> None:
         place = Path(folder).absolute()
-        self._info = described(info, address=str(place), tap_alone=False)
+        self._info = described(info, address=os.path.realpath(place), tap_alone=False)
         if (rate_hz is not None) is not bool(self._info.channels):
             raise InvalidValueError(
                 "channels and their rate belong together",
