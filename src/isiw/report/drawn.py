@@ -117,7 +117,7 @@ def _estimated(
         "scoredMs": [_number(isi_ms) for isi_ms in estimate.scored_ms],
         "scores": _rounded(np.asarray(estimate.scores), FINE),
         "stop": estimate.stop,
-        "reason": plain(estimate.reason),
+        "reason": plain(estimate.reason).removeprefix(said[0]).lstrip(),  # which begins with what is lacking
         "isiMs": [_number(isi_ms) for isi_ms in estimate.grid_ms[kept]],
         **{name: _rounded(1e3 * np.asarray(values)[kept], FINE) for name, values in bands.items()},
     }
