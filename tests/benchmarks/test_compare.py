@@ -121,6 +121,12 @@ def test_the_sentences_have_the_figures() -> None:
     assert "not above it are `nr`" in third
 
 
+def test_without_the_main_people_only_what_choosing_saves_is_said() -> None:
+    rows = rows_with(FOUND).assign(cohort="gaussian")
+    (only,) = sentences(table_of(rows, {}), rows)
+    assert "constant-CV noise (`gaussian`)" in only
+
+
 @pytest.mark.slow
 def test_other_figures_are_another_sentence() -> None:
     worse = FOUND | {"default": FOUND[EVEN], EVEN: FOUND["default"], "nr": (0.0, 0.9, 0.9, 0.9)}

@@ -29,6 +29,7 @@ from isiw.signals.plausible import (
     counted_of,
     isi_far,
     odd_amplitudes,
+    odd_background,
     require_plausible,
     require_plausible_range,
     unconfirmed,
@@ -276,8 +277,9 @@ class Recorder(Recording[Trial], Judging):
         self._conclude(trial)
         if self._put_in_doubt():
             return
-        odd = odd_amplitudes(counted_of(self.trials), self._detection_limit_mv)
-        self._doubts = self._doubts.after((isi_far(isi_ms, asked.isi_ms, space), *odd))
+        odd = isi_far(isi_ms, asked.isi_ms, space), odd_background(background_rms_uv)
+        amplitudes = odd_amplitudes(counted_of(self.trials), self._detection_limit_mv)
+        self._doubts = self._doubts.after((*odd, *amplitudes))
         if self._doubts.new is not None:
             self._warn(self._doubts.new)
 
