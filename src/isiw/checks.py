@@ -135,7 +135,7 @@ def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
 
 def mean_and_sd(what: str, value: object) -> tuple[float, float]:
     """The mean and the SD of a delay, both positive [ms]."""
-    pair = tuple(value) if _is_list(value) else ()
+    pair = tuple(value) if isinstance(value, Iterable) and getattr(value, "ndim", 1) != 0 else ()
     if len(pair) != 2:
         raise InvalidValueError(
             f"{what} must be a mean and an SD [ms]", got=value, remedy="Give both, such as (183.1, 6.0)."
@@ -173,14 +173,9 @@ def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
     return value
 
 
-def _is_list(value: object) -> TypeGuard[Iterable[Any]]:
-    """True of what holds several values; an array without a dimension says that it can be iterated, and cannot."""
-    return isinstance(value, Iterable) and not isinstance(value, str) and getattr(value, "ndim", 1) != 0
-
-
 def numbers(what: str, values: Any, **bounds: Unpack[Bounds]) -> tuple[float, ...]:
-    """A list of numbers."""
-    if not _is_list(values):
+    """A list of numbers; an array without a dimension says that it can be iterated, and is none."""
+    if not isinstance(values, Iterable) or isinstance(values, str) or getattr(values, "ndim", 1) == 0:
         raise InvalidValueError(f"{what} must be a list of numbers", got=values)
     return tuple(number(f"each of {what}", value, **bounds) for value in values)
 

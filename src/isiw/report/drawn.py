@@ -94,8 +94,12 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
 def _estimated(
     header: Header, estimate: EstimateRecord, known: Sequence[Trial], *, silent: bool, in_doubt: bool
 ) -> dict[str, Any]:
-    """An estimate, with the trials that it rests on; a session that is silent or in doubt as a whole found nothing."""
-    nothing = lacking(sum(trial.isi_ms is not None for trial in known), silent=silent, in_doubt=in_doubt)
+    """An estimate, with the trials that it rests on; a session that is silent or in doubt as a whole found nothing.
+
+    An intervention knows its window from the search before it.
+    """
+    pairs = None if header.intervention else sum(trial.isi_ms is not None for trial in known)
+    nothing = lacking(pairs, silent=silent, in_doubt=in_doubt)
     window = estimate.window if nothing is None else None
     said = [f"{nothing}"] if nothing is not None else _said(header, estimate, known)
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
