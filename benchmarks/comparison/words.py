@@ -48,19 +48,16 @@ WHO: Final[Mapping[str, str]] = {
 
 
 def sentences(table: pd.DataFrame, rows: pd.DataFrame) -> list[str]:
-    """What follows: what choosing saves, how the ways to choose differ, and whom not to trust; the latter of `MAIN`.
+    """What follows: what choosing saves, how the ways to choose differ, and whom not to trust.
 
     Args:
         table: as `measures.table_of` gives it.
         rows: the rows that it was made of.
     """
     main = table[table["cohort"] == MAIN].set_index("strategy")
-    others = [cohort for cohort in table["cohort"].unique() if cohort != MAIN]
-    if main.empty:
-        return [savings(table, others)]
     compared = differences(rows[(rows["cohort"] == MAIN) & (rows["strategy"] != GUESS)], DEFAULT)
     return [
-        savings(table, [MAIN, *others]),
+        savings(table, [MAIN, *(cohort for cohort in table["cohort"].unique() if cohort != MAIN)]),
         choosing(compared[compared["trial"] == EARLY]),
         trusting(main),
     ]
