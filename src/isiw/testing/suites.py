@@ -188,10 +188,7 @@ def _check_learning(model: ResponseModel, space: DesignSpace, trials: Trials) ->
 
 
 def _all_nan(kept: object, name: str = "", deepest: int = 3) -> Iterator[tuple[str, bool]]:
-    """Each array of numbers that an object or its parts keep, and whether all of them are NaN.
-
-    Weights that become NaN choose the same hypothesis of all, and so an estimate that looks as good as any.
-    """
+    """Each array of numbers that a posterior keeps, and whether all are NaN, as which its estimate need not look."""
     if isinstance(kept, np.ndarray) and kept.dtype.kind == "f" and kept.size:
         yield name, bool(np.isnan(kept).all())
     elif deepest and hasattr(kept, "__dict__"):
