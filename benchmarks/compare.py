@@ -37,7 +37,16 @@ from benchmarks.comparison.running import (
     run_part,
     timed,
 )
-from benchmarks.comparison.words import DEFAULT, PEOPLE, compared_rows, readable, readme_table, savings, sentences
+from benchmarks.comparison.words import (
+    DEFAULT,
+    MAIN,
+    PEOPLE,
+    compared_rows,
+    readable,
+    readme_table,
+    savings,
+    sentences,
+)
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.tables import write_tables
@@ -60,7 +69,7 @@ the same eleven)."""
 def write(
     rows: pd.DataFrame, processor: dict[str, float], facts: dict[str, object], out: Path, drawn: Path | None = None
 ) -> None:
-    """Tables; with even ISIs and the default among the rows, sentences and picture, too.
+    """Tables; with even ISIs and the default among the rows of `MAIN`, sentences and picture, too.
 
     Args:
         rows: of all that was run, and of the fixed window.
@@ -70,7 +79,7 @@ def write(
         drawn: the picture's path; without it beside the results.
     """
     table = table_of(rows, processor)
-    if not {DEFAULT, EVEN} <= set(table["strategy"]):
+    if not {DEFAULT, EVEN} <= set(table.loc[table["cohort"] == MAIN, "strategy"]):
         write_tables({"All rows": table}, facts, out)
         out.with_suffix(".md").write_text(_text(table, facts), encoding="utf-8")
         return

@@ -52,9 +52,7 @@ classdef isiw < handle
       for name = fieldnames(plan)'
         pairs(end + 1:end + 2) = {name{1}, jsonencode(plan.(name{1}))};
       end
-      this.id = char(id);
-      this.take(this.post('/sessions', pairs));
-      this.asked = [];
+      this.begin(id, this.post('/sessions', pairs));
     end
 
     function resume(this, id, lost_pulses, takeover)
@@ -66,10 +64,8 @@ classdef isiw < handle
       if nargin < 4
         takeover = false;
       end
-      this.id = char(id);
       pairs = {'lost_pulses', number(lost_pulses), 'client', this.key, 'takeover', truth(takeover)};
-      this.take(this.post(this.path('resume'), pairs));
-      this.asked = [];
+      this.begin(id, this.post(['/sessions/' char(id) '/resume'], pairs));
     end
 
     function [trial, isi_ms, intensity_pct_rmt] = ask(this)
@@ -166,6 +162,13 @@ classdef isiw < handle
       % By which a repetition is known, however late it comes.
       this.noted = this.noted + 1;
       key = sprintf('%s-%d', datestr(now, 'yyyymmddTHHMMSSFFF'), this.noted);
+    end
+
+    function begin(this, id, answer)
+      % From here on the calls are of this session; after a refusal they stay of the one before.
+      this.id = char(id);
+      this.take(answer);
+      this.asked = [];
     end
 
     function take(this, answer)

@@ -135,7 +135,7 @@ def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
 
 def mean_and_sd(what: str, value: object) -> tuple[float, float]:
     """The mean and the SD of a delay, both positive [ms]."""
-    pair = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
+    pair = tuple(value) if isinstance(value, Iterable) and getattr(value, "ndim", 1) != 0 else ()
     if len(pair) != 2:
         raise InvalidValueError(
             f"{what} must be a mean and an SD [ms]", got=value, remedy="Give both, such as (183.1, 6.0)."

@@ -22,7 +22,7 @@ Warnings, which are no errors:
     ClockWarning                          the computer's clock was set, so what was given counts by other evidence
     DiskWarning                           a disk cannot do all that a log asks of one
     ImplausibleDataWarning                data that look like a slip of unit; they are learnt all the same
-    OtherVersionsWarning                  a session continues with other versions, and may choose other ISIs
+    OtherVersionsWarning                  a session or study continues with other versions, and may choose other ISIs
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class DiskWarning(UserWarning):
 
 
 class OtherVersionsWarning(UserWarning):
-    """A session continues with versions other than those it was logged with, and may choose other ISIs."""
+    """A session or a study continues with other versions than it began with, and may choose other ISIs."""
 
 
 class ImplausibleDataWarning(UserWarning):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from benchmarks.compare import write
 from benchmarks.comparison import running
 from benchmarks.comparison.measures import lasting, ratio, table_of
 from benchmarks.comparison.rows import EVEN, GUESS, Part, chosen, matrix, parts
@@ -130,6 +131,12 @@ def test_the_sentences_have_the_figures() -> None:
     assert "0 % of the default's answers" in third
     assert "`nr` (75 %)" in third
     assert "not above it are `nr`" in third
+
+
+def test_without_the_main_people_the_tables_are_written_and_nothing_else(tmp_path: Path) -> None:
+    write(rows_with(FOUND).assign(cohort="gaussian"), {}, {}, tmp_path / "c")
+    assert {path.name for path in tmp_path.iterdir()} == {"c.json", "c.md"}
+    assert "What follows" not in (tmp_path / "c.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -355,6 +356,9 @@ def test_pairs_of_several_intensities_are_asked_about() -> None:
     table = pd.DataFrame({"isi_ms": [10, 20, 30, 40], "mep_mv": 0.2, "intensity_pct_rmt": [110, 110, 130, 130]})
     with pytest.raises(IsiwError, match=r"several intensities; got '110, 130 % RMT'.*--where \"intensity_pct_rmt=110"):
         read_people(table, IMPACT)
+    exported = table.assign(intensity_pct_rmt=[math.nan, math.nan, 130, 130])  # as in isiw.s tables
+    with pytest.raises(IsiwError, match=r"several intensities; got '130 % RMT, and some say none'"):
+        read_people(exported, IMPACT)
     for wanted, count in (("130", 2), ("*", 4)):
         (person,) = read_people(table, IMPACT.saying(where={"intensity_pct_rmt": wanted}))
         assert len(person.trials) == count

@@ -103,6 +103,7 @@ def test_a_name_that_a_page_could_obey_is_plain(record: SessionRecord) -> None:
 def test_a_belief_that_hardly_a_trial_bears_names_no_window(tmp_path: Path) -> None:
     shown = drawn(tapped(tmp_path / "s.mcap", trials=6))["beliefs"]
     assert (shown[0]["found"], shown[0]["window"]) == (f"{TOO_FEW}", [])
+    assert "Fewer than three" not in shown[0]["reason"]  # it is said once
     last = shown[max(shown)]
     assert last["found"].startswith("The tap probably enhances the MEP at ISIs of")
     assert last["found"].split("ISIs of ")[1].startswith(f"{last['window'][0][0]:g}–")

@@ -16,6 +16,7 @@ from isiw.errors import LogError
 from isiw.report.evidence import changed_with_time, contradiction, growth, no_comparison, nothing_stood_out, p_of_larger
 from isiw.summary import NO_MEP
 from isiw.trials import Status, Trial
+from isiw.types import FloatArray
 from isiw.window import Window
 from scripted import scripted_strategy
 
@@ -95,6 +96,22 @@ def test_amplitudes_that_are_smaller_since_isis_move_to_the_edges_have_not_shrun
     said = changed_with_time(WINDOW, session, (isis_ms[order].tolist(), usual_mv[order].tolist()))
     assert said is None if word is None else f"The amplitudes {word} during the session" in str(said)
     assert growth(meps_mv) < -3  # as if they had, were it not for the ISIs
+
+
+def test_a_change_shows_in_many_trials_as_in_few_though_each_is_compared_with_some_of_the_others() -> None:
+    rng = np.random.default_rng(7)
+    found = np.array([growth(rng.lognormal(sigma=0.5, size=530), None, rng.uniform(0, 320, 530)) for _ in range(60)])
+    assert np.abs(found).max() < 4  # standard errors
+    assert 0.8 < found.std() < 1.2
+    rising = rng.lognormal(0.003 * np.arange(530), 0.5)
+    assert growth(rising) == pytest.approx(growth_by_all_pairs(rising), rel=0.05)
+
+
+def growth_by_all_pairs(meps_mv: FloatArray) -> float:
+    """Kendall's statistic of amplitudes against order, in standard errors, ties and ISIs apart."""
+    n = len(meps_mv)
+    rises = np.triu(np.sign(np.subtract.outer(meps_mv, meps_mv)).T).sum()
+    return float(rises) / float(np.sqrt(n * (n - 1) * (2 * n + 5) / 18))
 
 
 def test_nothing_is_larger_where_everything_is_equal() -> None:

@@ -11,6 +11,7 @@ from isiw.pairing import Delivered
 from isiw.pairing.agenda import Agenda, FollowedPair, course_of
 from isiw.pairing.pulses import pairing_of
 from isiw.pairing.words import NOT_YET
+from isiw.report.drawn import drawn
 from isiw.report.intervention import InterventionContents, intervention_page
 from isiw.report.page import report_page
 from isiw.report.words import final_statement
@@ -58,6 +59,13 @@ def test_a_course_is_what_was_known_at_each_pair(tmp_path: Path) -> None:
     assert all(pair.low_ms <= pair.best_ms <= pair.high_ms for pair in course)
     assert max(abs(pair.best_ms - 100.0) for pair in course) < 10.0
     assert min(pair.p_inside for pair in course if not pair.probe) > 0.8
+
+
+def test_the_live_page_has_the_window_that_was_searched_for_from_the_first_pulse_on(tmp_path: Path) -> None:
+    session(tmp_path / "s.mcap", intervention(arms=(Arm.WINDOW,), before=6)).run()
+    first = drawn(read_session(tmp_path / "s.mcap"))["beliefs"][0]
+    assert first["window"]
+    assert "Fewer than three pairs" not in first["found"]
 
 
 def test_a_concealed_arm_is_not_shown_though_the_change_is() -> None:

@@ -180,6 +180,7 @@ second.tell(trial, isi_ms, 0.1);
 try, first.tell(trial, isi_ms, 0.2); catch problem, disp(problem.identifier); end
 first = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
 try, first.resume('P07'); catch problem, disp(problem.identifier); end
+try, second.create('..'); catch, end  % it keeps the session that it has
 second.close();
 first.resume('P07');
 disp(first.trials);

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Never
 
+import numpy as np
 import pytest
 
 from forked import Forked
@@ -165,6 +166,16 @@ def test_a_doubt_is_a_warning_and_an_event(log: Path) -> None:
             session.tell(session.ask(), 12.0)
     assert [warning.filename for warning in warned] == [__file__]
     assert [event.kind for event in read_session(log).events] == ["doubt"]
+
+
+@pytest.mark.parametrize(("rms_uv", "said"), [(0.004, "Is it in mV"), (9e3, "Is it in nV"), (4.0, None), (0.0, None)])
+def test_emg_before_the_pulse_in_another_unit_is_a_doubt(log: Path, rms_uv: float, said: str | None) -> None:
+    doubts = list[str]()
+    with open_session(scripted_strategy(9), log, on_doubt=lambda finding: doubts.append(f"{finding}")) as session:
+        for mep_mv in (0.1, 0.2):
+            session.tell(session.ask(), mep_mv, background_rms_uv=rms_uv)
+    assert len(doubts) == (said is not None)
+    assert all(f"{said}" in doubt for doubt in doubts)
 
 
 def test_mistrials_count_with_their_reason_and_are_asked_again(log: Path) -> None:
@@ -560,7 +571,7 @@ def test_a_log_of_an_earlier_version_with_more_changes_resumes_with_those_that_a
     assert "20 changes were noted" in [event.text for event in read_session(log).events if event.kind == "resume"][-1]
 
 
-@pytest.mark.parametrize("nothing", [None, 3])
+@pytest.mark.parametrize("nothing", [None, 3, np.arange(3)])
 def test_what_is_said_about_a_session_is_a_text(log: Path, nothing: Any) -> None:
     with open_session(scripted_strategy(9), log) as session:
         run(session, 1)
@@ -568,6 +579,12 @@ def test_what_is_said_about_a_session_is_a_text(log: Path, nothing: Any) -> None
             session.note(nothing)
         with pytest.raises(InvalidValueError, match="reason of an exclusion"):
             session.exclude(0, nothing)
+        session.ask()
+        with pytest.raises(InvalidValueError, match="reason of a mistrial"):
+            session.mistrial(nothing)
+        for said in () if nothing is None else (session.note, partial(session.exclude, 0)):
+            with pytest.raises(InvalidValueError, match="the key of"):
+                said("coil moved", key=nothing)
     record = read_session(log)
     assert not record.events
     assert record.table[0].counts

@@ -48,6 +48,14 @@ def test_what_is_no_device_begins_nothing_and_is_told_what_one_has(log: Path, de
     assert list(log.parent.iterdir()) == []
 
 
+@pytest.mark.parametrize("earlier", [[], [0.1, 0.2], "P07.mcap"])
+def test_trials_of_before_are_refused_with_where_they_go(log: Path, earlier: Any) -> None:
+    with pytest.raises(InvalidValueError, match=r"strategy\.learn_all"):
+        Session(ScriptedDevice(), scripted_strategy(), log=log, earlier=earlier)
+    with pytest.raises(InvalidValueError, match="resume must be"):
+        open_session(scripted_strategy(), log, resume=earlier)
+
+
 def test_a_session_that_was_never_armed_promises_no_log(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     device, free = ScriptedDevice(), threading.Event()
     monkeypatch.setattr(device, "stage", lambda: free.wait(9.0))

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 
 import isiw
@@ -222,9 +223,12 @@ def test_a_regression_gives_up_after_99_iterations(name: str) -> None:
         ("svmr", {"acquisition": "best"}, "acquisition"),
         ("gpr", {"stop_edges": "none"}, "edges"),
         ("incremental", {"rule": "eye"}, "rule"),
+        ("default", {"acquisition": np.arange(3.0)}, "acquisition"),
+        ("default", {"hit_delay_ms": np.array(1.0)}, "a mean and an SD"),
+        ("default", {"intensity_pct_rmt": 2e5}, "intensity_pct_rmt must"),
     ],
 )
-def test_an_invalid_setting_of_the_dissertations_is_refused(name: str, settings: dict[str, Any], what: str) -> None:
+def test_an_invalid_setting_is_refused(name: str, settings: dict[str, Any], what: str) -> None:
     with pytest.raises(InvalidValueError, match=what):
         make_strategy(name, **settings)
 

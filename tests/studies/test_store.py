@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.errors import ConfigError, StudyError
+from isiw.errors import ConfigError, OtherVersionsWarning, StudyError
 from isiw.native import engine
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Unit, load_study
@@ -149,6 +149,9 @@ def test_a_folder_that_other_code_began_is_read_and_not_gone_on_with(store: Stor
         again.require_same_code()
     path.write_text(re.sub(r'code = "\w+"\n', "", path.read_text()))
     again.require_same_code()
+    path.write_text(re.sub(r'numpy = ".+"', 'numpy = "1.0.0"', path.read_text()))
+    with pytest.warns(OtherVersionsWarning, match=r"was begun with numpy 1\.0\.0 \(now "):
+        again.require_same_code()
 
 
 def test_no_part_is_written_through_a_link_and_left_overs_go_with_the_next_run(store: Store) -> None:

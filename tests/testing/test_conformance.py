@@ -110,6 +110,7 @@ class Broken:
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> Posterior:
         before = self.model.begin(space, seed, people)
+        object.__setattr__(before, "own_weights", np.zeros(9))
         backwards = self.fault == "predicts backwards"
         return Backwards(**{f.name: getattr(before, f.name) for f in fields(before)}) if backwards else before
 
@@ -131,6 +132,8 @@ class Broken:
                     object.__setattr__(posterior, changed.name, getattr(after, changed.name))
             case "forgets the first":
                 return after if after.trials > 1 else posterior
+            case "loses its weights":
+                object.__setattr__(after, "own_weights", np.full(9, np.nan if after.trials > 5 else 0.0))
             case "weighs by the order":
                 return self.model.update(posterior, replace(observation, mep_mv=observation.mep_mv * after.trials**4))
         return after
@@ -145,6 +148,7 @@ class Broken:
         ("writes into the posterior", "learnt from one trial more|never changes"),
         ("depends on chance", "same seed and trials"),
         ("forgets the first", "one trial more"),
+        ("loses its weights", "does not become NaN after: usual trials; found: own_weights"),
         pytest.param("weighs by the order", "order", marks=pytest.mark.slow),
         pytest.param("predicts backwards", "holds those of smaller probability", marks=pytest.mark.slow),
     ],

@@ -266,10 +266,12 @@ def _with_intensities(trials: Sequence[Trial], columns: Columns) -> tuple[list[T
             raise columns.of["intensity"].refused(row, "is no intensity in % RMT", remedy)
         if trial.wanted_isi_ms is not None:
             paired[pct_rmt] = columns["intensity"].text(row)
-    if len(texts := [text for text in paired.values() if text]) > 1 and name not in columns.layout.where:
-        what, got = f"the pairs of {columns['isi'].of} have several intensities", ", ".join(texts)
+    if len(paired) > 1 and name not in columns.layout.where:
+        texts = [text for text in paired.values() if text]
+        what, got = f"the pairs of {columns['isi'].of} have several intensities", f"{', '.join(texts)} % RMT"
+        got += ", and some say none" if None in paired else ""  # as isiw's own tables say nothing of the usual one
         remedy = f'Say --where "{name}={texts[0]}" for one of them, or --where "{name}={ALL}" '
-        raise InvalidValueError(what, got=f"{got} % RMT", remedy=f"{remedy}if all are to be analysed together.")
+        raise InvalidValueError(what, got=got, remedy=f"{remedy}if all are to be analysed together.")
     usual = next(iter(paired)) if len(paired) == 1 else None
     for trial, pct_rmt in zip(trials, stated, strict=True):
         of_alone = trial.wanted_isi_ms is None and not trial.tap_alone and pct_rmt != usual

@@ -90,7 +90,7 @@ def exclusion(
     repetition of that must not do it later.
     """
     number, reason = whole("the number of a trial", number), text("the reason of an exclusion", reason)
-    text("the key of an exclusion", key or "")
+    text("the key of an exclusion", "" if key is None else key)
     event = Event.model_construct(kind="exclusion", trial=number, text=reason, key=key)  # its number is checked below
     if not is_logged(event, events):
         possible = {trial.index for trial in trials if trial.counts or (key is not None and trial.excluded)}
@@ -101,7 +101,7 @@ def exclusion(
 def inclusion(trials: TrialTable, number: int, key: str | None = None, events: Iterable[Event] = ()) -> Event:
     """That a trial that was excluded counts again; a key is as for `exclusion`."""
     number = whole("the number of a trial", number)
-    text("the key of an inclusion", key or "")
+    text("the key of an inclusion", "" if key is None else key)
     event = Event.model_construct(kind="inclusion", trial=number, text="Included again by the operator.", key=key)
     if not is_logged(event, events):
         possible = [trial.index for trial in trials if trial.excluded or (key is not None and trial.counts)]
@@ -138,7 +138,7 @@ def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
 
 def change(trials: TrialTable, what: str, key: str | None = None) -> Event:
     """That something changed after the last trial that may bear on all later MEPs; trials count as they did."""
-    text("the key of a change", key or "")
+    text("the key of a change", "" if key is None else key)
     return Event(kind=CHANGE, trial=trials[-1].index if trials else None, text=text("a change", what), key=key)
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from isiw.figures import Edge
+from isiw.log.headers import Header
 from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.tables import trial_row
@@ -39,8 +42,13 @@ _ROOM: Final = 0.35
 
 def drawn(record: SessionRecord) -> dict[str, Any]:
     """A session as numbers for the browser."""
-    header = record.header
-    estimated = {estimate.trial: _estimated(record, estimate) for estimate in record.estimates}
+    header, told = record.header, record.table.told
+    numbers = [trial.index for trial in told]
+    wrong = {"silent": record.is_silent, "in_doubt": record.in_doubt}
+    estimated = {
+        estimate.trial: _estimated(header, estimate, told[: bisect_right(numbers, estimate.trial)], **wrong)
+        for estimate in record.estimates
+    }
     return {
         "reference": header.space.reference,
         "isiAxis": header.stimulus.isi_axis(header.space.reference),
@@ -83,11 +91,17 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
     }
 
 
-def _estimated(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
-    pairs = sum(trial.isi_ms is not None for trial in _known_by(record, estimate.trial))
-    nothing = lacking(pairs, silent=record.is_silent, in_doubt=record.in_doubt)
+def _estimated(
+    header: Header, estimate: EstimateRecord, known: Sequence[Trial], *, silent: bool, in_doubt: bool
+) -> dict[str, Any]:
+    """An estimate, with the trials that it rests on; a session that is silent or in doubt as a whole found nothing.
+
+    An intervention knows its window from the search before it.
+    """
+    pairs = None if header.intervention else sum(trial.isi_ms is not None for trial in known)
+    nothing = lacking(pairs, silent=silent, in_doubt=in_doubt)
     window = estimate.window if nothing is None else None
-    said = [f"{nothing}"] if nothing is not None else _said(record, estimate)
+    said = [f"{nothing}"] if nothing is not None else _said(header, estimate, known)
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {
         "profile": estimate.profile_mv,
@@ -107,22 +121,16 @@ def _estimated(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any
         "scoredMs": [_number(isi_ms) for isi_ms in estimate.scored_ms],
         "scores": _rounded(np.asarray(estimate.scores), FINE),
         "stop": estimate.stop,
-        "reason": plain(estimate.reason),
+        "reason": plain(estimate.reason).removeprefix(said[0]).lstrip(),  # which begins with what is lacking
         "isiMs": [_number(isi_ms) for isi_ms in estimate.grid_ms[kept]],
         **{name: _rounded(1e3 * np.asarray(values)[kept], FINE) for name, values in bands.items()},
     }
 
 
-def _said(record: SessionRecord, estimate: EstimateRecord) -> list[str]:
+def _said(header: Header, estimate: EstimateRecord, known: Sequence[Trial]) -> list[str]:
     """The answer of an estimate, and warnings and what is not known of the tap, as the final statement says them."""
-    said = answer_and_warnings(estimate, record.header, _known_by(record, estimate.trial))
-    unmeasured = tap_unmeasured(estimate, record.header.stimulus)
-    return [*(one.text for one in said), *([unmeasured] if unmeasured else [])]
-
-
-def _known_by(record: SessionRecord, number: int) -> list[Trial]:
-    """The trials that an estimate after this one rests on."""
-    return [trial for trial in record.table.told if trial.index <= number]
+    unmeasured = tap_unmeasured(estimate, header.stimulus)
+    return [*(one.text for one in answer_and_warnings(estimate, header, known)), *([unmeasured] if unmeasured else [])]
 
 
 def _sweep(channels: dict[str, Channel], trial: Trial, mep_window_ms: tuple[float, float]) -> list[dict[str, Any]]:

@@ -15,7 +15,7 @@ from isiw.log.record import SessionRecord
 from isiw.signals.plausible import counted_of, stopped_after
 from isiw.summary import IN_DOUBT, NO_MEP
 from isiw.trials import Trial
-from isiw.types import ArrayLike, FloatArray
+from isiw.types import ArrayLike, FloatArray, IntArray
 from isiw.window import Window
 
 ENOUGH_ON_EACH_SIDE = 4
@@ -32,8 +32,9 @@ NEAR_MS: Final = 15.0
 LEAST_MV: Final = 0.001
 """Amplitudes below are not told apart [mV]."""
 
-ROWS: Final = 200
-"""So many trials are compared with all others at a time."""
+MOST_COMPARED: Final = 100
+"""Of more trials than this, each is compared with every second, third … one: a page tests the trials before each
+estimate anew, so that comparing all pairs would cost the cube of their number."""
 
 Expected: TypeAlias = tuple[Sequence[float], Sequence[float]]
 """ISIs [ms], and the MEP that is expected at each [mV]."""
@@ -77,7 +78,9 @@ def p_of_larger(inside: Sequence[float], outside: Sequence[float]) -> float:
     count, pairs = len(inside) + len(outside), len(inside) * len(outside)
     tied = _tied([*inside, *outside])
     error = math.sqrt(pairs / 12 * (count + 1 - float((tied**3 - tied).sum()) / (count * (count - 1))))
-    above_mean = float(np.sign(np.subtract.outer(inside, outside)).sum()) / 2
+    ordered = np.sort(outside)
+    smaller, up_to = np.searchsorted(ordered, inside).sum(), np.searchsorted(ordered, inside, "right").sum()
+    above_mean = float(smaller + up_to - pairs) / 2
     return _beyond((above_mean - 0.5) / error) if error else 1.0
 
 
@@ -118,21 +121,25 @@ def growth(meps_mv: ArrayLike, usual_mv: ArrayLike | None = None, isis_ms: Array
     sizes = scaled = np.asarray(meps_mv, float)
     if usual_mv is not None:
         scaled = np.maximum(sizes, LEAST_MV) / np.maximum(usual_mv, LEAST_MV)
-    n, order = sizes.size, np.arange(sizes.size)
+    n = sizes.size
     isi_ms = np.broadcast_to(np.asarray(isis_ms, float), n)
-    rose, squares, of_trials = 0.0, 0.0, np.zeros(n)
-    for some in np.array_split(order[:, np.newaxis], max(1, n // ROWS)):  # n² numbers do not fit in memory
-        later = slice(int(some[0, 0]), None)
-        weights = np.exp(-0.5 * ((isi_ms[later] - isi_ms[some]) / NEAR_MS) ** 2) * (order[later] > some)
-        of_trials[some[:, 0]] += weights.sum(axis=1)
-        of_trials[later] -= weights.sum(axis=0)
-        squares += float((weights**2).sum())
-        rises = np.sign(scaled[later] - scaled[some]) * (sizes[later] != sizes[some])
-        rose += float((weights * rises).sum())
+    earlier, later = _compared(n)
+    weights = np.exp(-0.5 * ((isi_ms[later] - isi_ms[earlier]) / NEAR_MS) ** 2)
+    of_trials = np.bincount(earlier, weights, n) - np.bincount(later, weights, n)
+    rises = np.sign(scaled[later] - scaled[earlier]) * (sizes[later] != sizes[earlier])
     tied = _tied(scaled)
     untied = 1.0 - float((tied**3 - tied).sum()) / (n**3 - n)
-    variance = untied * (float((of_trials**2).sum()) + squares) / 3
-    return rose / math.sqrt(variance) if variance > 0 else 0.0
+    variance = untied * float(of_trials @ of_trials + weights @ weights) / 3
+    return float(weights @ rises) / math.sqrt(variance) if variance > 0 else 0.0
+
+
+def _compared(n: int) -> tuple[IntArray, IntArray]:
+    """The numbers of the earlier and of the later trial of all pairs that are compared."""
+    apart = -(-n // MOST_COMPARED)
+    first, second = np.triu_indices(-(-n // apart), 1)
+    of_class = np.arange(apart)[:, np.newaxis]
+    earlier, later = ((apart * place + of_class).ravel() for place in (first, second))
+    return earlier[later < n], later[later < n]
 
 
 def _tied(values: ArrayLike) -> FloatArray:

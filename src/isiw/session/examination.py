@@ -127,7 +127,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
     def note(self, text: str, trial: int | None = None, key: str | None = None) -> None:
         """Put a remark on disk; with a key that the same one has already, nothing."""
         checks.text("a note", text)
-        checks.text("the key of a note", key or "")
+        checks.text("the key of a note", "" if key is None else key)
         self.remark(Event(kind="note", trial=self.last if trial is None else trial, text=text, key=key))
 
     def remark(self, event: Event) -> None:

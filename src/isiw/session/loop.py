@@ -11,7 +11,7 @@ from typing import Unpack
 
 from isiw.decision import StopDecision
 from isiw.devices.protocol import Device, Readiness
-from isiw.errors import ClockWarning, NotDelivered, warn
+from isiw.errors import ClockWarning, InvalidValueError, NotDelivered, warn
 from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulse_ages
 from isiw.log.schema import Event
@@ -73,7 +73,13 @@ class Session(Judging):
         earlier: Earlier | None = None,
         **options: Unpack[Options],
     ) -> None:
-        self._earlier = earlier or Earlier(partial(LogWriter.create, log))
+        if earlier is not None and not isinstance(earlier, Earlier):
+            raise InvalidValueError(
+                "earlier trials are learnt by a session's strategy",
+                got=earlier,
+                remedy="Call strategy.learn_all(trials) before; a log is continued by isiw.resume.",
+            )
+        self._earlier = Earlier(partial(LogWriter.create, log)) if earlier is None else earlier
         self._console = OperatorConsole(self)
         parts = assembled(self._console, device, strategy, log, self._earlier, options)
         self.log_path, self._header = parts.log_path, parts.header

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, Generic, Self, TypeVar
 
 from isiw import schedule
-from isiw.checks import flag, number
+from isiw.checks import flag, number, text
 from isiw.decision import StopDecision
 from isiw.devices.allowed import require_intensity, require_isi, require_left, require_state
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
@@ -29,6 +29,7 @@ from isiw.signals.plausible import (
     counted_of,
     isi_far,
     odd_amplitudes,
+    odd_background,
     require_plausible,
     require_plausible_range,
     unconfirmed,
@@ -276,8 +277,9 @@ class Recorder(Recording[Trial], Judging):
         self._conclude(trial)
         if self._put_in_doubt():
             return
-        odd = odd_amplitudes(counted_of(self.trials), self._detection_limit_mv)
-        self._doubts = self._doubts.after((isi_far(isi_ms, asked.isi_ms, space), *odd))
+        odd = isi_far(isi_ms, asked.isi_ms, space), odd_background(background_rms_uv)
+        amplitudes = odd_amplitudes(counted_of(self.trials), self._detection_limit_mv)
+        self._doubts = self._doubts.after((*odd, *amplitudes))
         if self._doubts.new is not None:
             self._warn(self._doubts.new)
 
@@ -315,18 +317,18 @@ class Recorder(Recording[Trial], Judging):
             reason: a `Kind` or its value; any other text is logged as a note, under "rejected".
 
         Raises:
-            InvalidValueError: nothing was asked.
+            InvalidValueError: nothing was asked, or a reason that is no text.
             LogError: the log cannot be written.
 
         Warns:
             ImplausibleDataWarning: as many mistrials in a row as pause a session.
         """
-        known = Kind.of_mistrial(reason)
+        known = Kind.of_mistrial(reason := text("the reason of a mistrial", reason))
         with self._lock:
             self._examination.conclude()
             asked = self._require_asked()
             if known != reason:
-                self._examination.note(str(reason), trial=asked.trial)
+                self._examination.note(reason, trial=asked.trial)
             own: Any = {"tap_alone": asked.tap_alone, "intensity_pct_rmt": self._of_pair(asked.intensity_pct_rmt)}
             self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known, **own))
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Unpack, overload
 
-from isiw.checks import code
+from isiw.checks import code, flag
 from isiw.design import DesignSpace
 from isiw.devices.clock import MonotonicClock
 from isiw.devices.info import DeviceInfo
@@ -88,7 +88,7 @@ def open_session(
         require_given(trials)
         strategy.learn_all(trials)
     stated = _stated(strategy.space, options)
-    if resume and log_exists(path):
+    if flag("resume", resume) and log_exists(path):
         changes = {name: value for name, value in stated.items() if options.get(name) not in (None, "")}
         salvaged = salvage(path)
         return _own_loop_resumed(salvaged, read_salvaged(salvaged), strategy, changes, options)

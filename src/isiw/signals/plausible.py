@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from isiw.checks import number
 from isiw.design import DesignSpace
 from isiw.errors import IsiwError
-from isiw.findings import AMPLITUDE_MV, Finding, Kind, Severity, refused, require_percent
+from isiw.findings import AMPLITUDE_MV, BACKGROUND_LIMIT_UV, Finding, Kind, Severity, refused, require_percent
 from isiw.lazy import scipy
 from isiw.summary import ENOUGH_PAIRS
 from isiw.trials import MOST_ISI_SD_MS, RESPONSE_MV, Trial
@@ -85,6 +85,14 @@ def require_plausible_range(sd_mv: float, ends_mv: tuple[float, float] | None, p
     if 2 * sd_mv > AMPLITUDE_MV.most:  # the SD of anything is at most half of its range
         slip = AMPLITUDE_MV.slip(2 * sd_mv)
         raise refused(_implausible(f"an SD of {sd_mv:.4g} mV is more than any muscle gives", f"{slip}"), sd_mv)
+
+
+def odd_background(rms_uv: float | None) -> Finding | None:
+    """That EMG before the pulse [µV RMS] is probably in another unit; None where it is not, or is 0 or not known."""
+    if not rms_uv or (slip := BACKGROUND_LIMIT_UV.slip(rms_uv)) is None:
+        return None
+    kind, than = (Kind.QUIET, "less than any amplifier has") if rms_uv < 1 else (Kind.LOUD, "more than any muscle has")
+    return Finding(kind, Severity.DOUBT, f"A background of {rms_uv:.2g} µV RMS is {than}", slip)
 
 
 def off_by(isi_ms: float, asked_ms: float, space: DesignSpace) -> bool:

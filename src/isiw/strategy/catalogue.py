@@ -168,7 +168,7 @@ def settings_for(name: str, **settings: Any) -> Settings:
         )
     entry = _CATALOGUE[name]
     usual: Settings = pkgutil.resolve_name(entry.family)
-    if settings.get("acquisition") == OWN:
+    if isinstance(plan := settings.get("acquisition"), str) and plan == OWN:  # an array is equal to nothing
         _require_own_plan(usual, name)
         settings = {key: value for key, value in settings.items() if key != "acquisition"}
     return settings_from(usual, {**entry.meant, **settings}, name)

@@ -24,7 +24,7 @@ from typing import Any, Final
 import tomli_w
 
 import isiw
-from isiw.errors import StudyError, os_errors
+from isiw.errors import OtherVersionsWarning, StudyError, os_errors, warn
 from isiw.files import TEMPORARY, put
 from isiw.lazy import pa, parquet, pd
 from isiw.log.durable import claim
@@ -121,16 +121,23 @@ class Store:
         raise StudyError("the study has no such unit", got=key, remedy="The rows have their units in the column unit.")
 
     def require_same_code(self) -> None:
-        """Raise StudyError if isiw was changed since, but not its version: new rows do not belong to the others."""
-        began_with = read_toml(self.folder / "study.toml").get("versions", {}).get("code")
-        if began_with not in {None, code_checksum()}:
+        """Raise StudyError if isiw was changed since, but not its version: new rows do not belong to the others.
+
+        Warns:
+            OtherVersionsWarning: what isiw computes with has another version, so that rows may differ a little.
+        """
+        began_with, now = read_toml(self.folder / "study.toml").get("versions", {}), _versions()
+        if (code := began_with.pop("code", None)) not in {None, now["code"]}:
             raise StudyError(
                 f"isiw was changed since {self.folder} was begun: new rows may not belong to those that are there",
-                got=f"code {code_checksum()}",
-                expected=f"code {began_with}",
+                got=f"code {now['code']}",
+                expected=f"code {code}",
                 remedy="Go back to that code, or begin in another folder. If you know that the change cannot matter, "
                 "take the line `code` out of study.toml.",
             )
+        others = (f"{name} {was} (now {now.get(name)})" for name, was in began_with.items() if was != now.get(name))
+        if said := ", ".join(others):
+            warn(f"{self.folder} was begun with {said}: new rows may differ from its others.", OtherVersionsWarning)
 
     @cached_property
     def _state(self) -> str:
@@ -153,10 +160,7 @@ def begin_store(study: Study, folder: str | Path) -> Store:
             remedy="Put that file back, or choose another folder.",
         )
     values = study_values(study)
-    versions = {"isiw": isiw.__version__}
-    versions |= {name: version(name) for name in ("numpy", "torch", "pandas") if find_spec(name)}
-    versions |= {"python": platform.python_version(), "code": code_checksum()}
-    text = tomli_w.dumps(values | {"checksum": _state(values), "versions": versions})
+    text = tomli_w.dumps(values | {"checksum": _state(values), "versions": _versions()})
     with _disk_errors(store.folder):
         for kind in ("parts", "errors"):
             (store.folder / kind).mkdir(parents=True, exist_ok=True)
@@ -191,6 +195,13 @@ def open_store(folder: str | Path) -> Store:
             remedy="Undo the change, or run the changed study in another folder.",
         )
     return Store(study, Path(folder))
+
+
+def _versions() -> dict[str, str]:
+    """The versions of what rows depend on, and the code of isiw."""
+    packages = {name: version(name) for name in ("numpy", "torch", "pandas") if find_spec(name)}
+    own = {"isiw": isiw.__version__, "code": code_checksum()}
+    return own | packages | {"python": platform.python_version()}
 
 
 def _state(values: Mapping[str, Any]) -> str:

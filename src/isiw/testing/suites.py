@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -138,11 +138,14 @@ def check_model(
     _check_learning(model, space, usual)
     once, again = (_after(make(), space, usual) for _ in range(2))
     require(same_estimates(once.estimate(), again.estimate()), "the same seed and trials give the same posterior")
-    for what, trials in trials_that_break_things(space).items():
+    numbers_at_first = {name for name, is_nan in _all_nan(model.begin(space, 1)) if not is_nan}
+    for what, trials in {"usual trials": usual, **trials_that_break_things(space)}.items():
         try:
             posterior = _after(model, space, trials)
             check_estimate(posterior.estimate(), space, f"after: {what}")
             _check_capabilities(posterior, space, 1, f"after: {what}")
+            lost = {name for name, is_nan in _all_nan(posterior) if is_nan} & numbers_at_first
+            require(not lost, f"what a posterior keeps does not become NaN after: {what}", ", ".join(sorted(lost)))
         except Exception as error:
             error.add_note(f"after: {what}, as (ISI [ms], MEP [mV]): {trials}; TMS alone, None, has the ISI NaN")
             raise
@@ -182,6 +185,15 @@ def _check_learning(model: ResponseModel, space: DesignSpace, trials: Trials) ->
         left = np.array_equal([observation.isi_ms, observation.mep_mv], np.array(trial, dtype=np.float32)[:, None])
         require(left, "update leaves the observation as it is")
         posterior = after
+
+
+def _all_nan(kept: object, name: str = "", deepest: int = 3) -> Iterator[tuple[str, bool]]:
+    """Each array of numbers that a posterior keeps, and whether all are NaN, as which its estimate need not look."""
+    if isinstance(kept, np.ndarray) and kept.dtype.kind == "f" and kept.size:
+        yield name, bool(np.isnan(kept).all())
+    elif deepest and hasattr(kept, "__dict__"):
+        for key, part in vars(kept).items():
+            yield from _all_nan(part, f"{name}.{key}".lstrip("."), deepest - 1)
 
 
 def _check_order(model: ResponseModel, space: DesignSpace, trials: Trials, tolerance_ms: float) -> None:

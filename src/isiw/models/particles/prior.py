@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Final
+from functools import cached_property, partial
+from typing import Annotated, Final
 
 import numpy as np
 
-from isiw.checks import Checked, Positive, Share, choice
+from isiw.checks import Checked, Share, choice, number
 from isiw.design import DesignSpace
 from isiw.models.particles.changes import INTENSITY_PCT, MATTERS, Change, ChangeKind, ChangePrior
 from isiw.models.particles.latents import BLOCKS, RECTIFIED, Latents, latents_of
@@ -91,7 +91,7 @@ class Prior(Checked):
     changes: ChangePrior = field(default_factory=ChangePrior)
     other_curve: Share = 0.25
     muscle: str | None = None
-    intensity_pct_rmt: Positive | None = None
+    intensity_pct_rmt: Annotated[float, partial(number, above=0, most=1e4)] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -33,12 +33,11 @@ enum {
     LOW_START_MS,
     LOW_LOG_WIDTH_MS,
     LOW_LOG_SHIFT,
-    OF_LEVELS, /* LEVEL_AT and what follows it among the fields, which particles carry along and never move */
-    MEANINGS
+    OF_LEVELS /* LEVEL_AT and what follows it among the fields, which particles carry along and never move */
 };
 enum { LOG_CEILING, LOG_SLOPE, LOG_INPUT_SD, LOG_SIGMA_Y, LOG_BOOST, REST_PCT }; /* of a curve */
 
-enum { MOST_OF_BLOCK = 32, MOST_BLOCKS = 64 }; /* how many latents a block has, and how many blocks there are */
+enum { MOST_OF_BLOCK = 32 }; /* how many latents a block has */
 #define NEVER (-1e30f)      /* log density of what cannot be */
 #define UNKNOWN 1e30f       /* in place of a log density that was not worked out yet */
 #define MOST_ONSET 0.9f     /* a threshold further up a curve would leave nothing of it */
