@@ -25,6 +25,8 @@ from benchmarks.recorded_law import BINS, SPREAD_EVENLY, histograms, windows
 from benchmarks.recorded_people import ADDED_MV, Bank, RecordedPerson, RecordedResponse, banks, smoothed
 from benchmarks.recorded_tables import error_by_person, sure_and_wrong
 
+import isiw
+
 LEVELS = [90.0, 100.0, 110.0, 120.0, 130.0]
 MEDIANS_MV = [0.02, 0.1, 0.5, 1.0, 1.5]
 
@@ -183,8 +185,13 @@ def test_the_command_writes_its_tables(made_up: Path, tmp_path: Path, capsys: py
 @pytest.mark.slow
 def test_a_lab_s_prior_is_of_the_other_persons_and_learnt_once(made_up: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[RecordedPerson] = []
+
+    def noted(person: RecordedPerson) -> isiw.subjects.SimulatedSubject:
+        asked.append(person)
+        return subject(person)
+
     monkeypatch.setattr("benchmarks.recorded_cohort.EARLIER_TRIALS", 3)
-    monkeypatch.setattr(RecordedPerson, "subject", lambda self: asked.append(self) or subject(self))
+    monkeypatch.setattr(RecordedPerson, "subject", noted)
     earlier = Earlier(RecordedPerson(0, 5, made_up), made_up / "lab.toml")
     prior = earlier.prior()
     assert [(one.bank.person, one.number >= EARLIER_NUMBERS) for one in asked] == [(2, True)]

@@ -356,6 +356,25 @@ def test_a_device_that_reports_another_intensity_than_it_was_asked_to_set_fires_
     assert len(inner.delivered) == 2 - stops
 
 
+@pytest.mark.parametrize(("reported", "stops"), [(50.0, False), (55.4, False), (56.0, True), (95.0, True)])
+def test_an_intensity_that_is_set_by_hand_is_never_above_the_highest(
+    inner: ScriptedDevice, clock: VirtualClock, reported: float, *, stops: bool
+) -> None:
+    device, visit = Reporting(inner, Readiness()), Visit(intensity_pct_rmt=90.0, intensity_pct_mso=45.0)
+    limited = LimitedDevice(
+        device, Limits(0, 200, min_iti_s=5.0, max_pulses=9, max_intensity_pct_rmt=110.0), clock, noted=visit
+    )
+    limited.stage()
+    clock.sleep_s(limited.wait_s())
+    device.state = Readiness(intensity_pct_mso=reported)
+    if stops:
+        with pytest.raises(LimitExceededError, match=r"reports a higher intensity.*at most 55\.0 % MSO"):
+            limited.deliver(Stimulus(0, 10), 1.0)
+    else:
+        limited.deliver(Stimulus(0, 10), 1.0)
+    assert len(inner.delivered) == (not stops)
+
+
 def test_a_whole_interval_passes_after_each_arming(inner: ScriptedDevice, clock: VirtualClock) -> None:
     _, limited = reporting(inner, clock, Readiness())
     limited.deliver(Stimulus(0, 10), 1.0)

@@ -71,6 +71,29 @@ def require_set(noted: Visit, asked_pct_rmt: float | None, state: Readiness) -> 
         )
 
 
+def require_at_most(most_pct_rmt: float | None, noted: Visit, state: Readiness) -> None:
+    """Raise LimitExceededError if a device that sets no intensity reports one above the highest.
+
+    Args:
+        most_pct_rmt: the highest intensity [% RMT]; None if none is stated.
+        noted: the usual intensity, as in `require_set`.
+        state: what it reports.
+    """
+    reported, usual_mso, usual_rmt = state.intensity_pct_mso, noted.intensity_pct_mso, noted.intensity_pct_rmt
+    if most_pct_rmt is None or reported is None or usual_mso is None or usual_rmt is None:
+        return
+    most_mso = usual_mso * most_pct_rmt / usual_rmt
+    if reported > most_mso + MOST_ROUNDED_PCT_MSO:
+        raise LimitExceededError(
+            "the device reports a higher intensity than the limits allow",
+            got=f"{reported:g} % MSO",
+            expected=f"at most {most_mso:.1f} % MSO, which is {most_pct_rmt:g} % RMT where {usual_rmt:g} % RMT is "
+            f"{usual_mso:g} % MSO",
+            remedy="This stimulus was not delivered. Set a lower intensity at the stimulator, or correct the two "
+            "intensities under [visit]; then continue.",
+        )
+
+
 class LimitedDevice:
     """A device that refuses what exceeds its limits, before anything is delivered. Safe to use from several threads.
 
@@ -137,6 +160,8 @@ class LimitedDevice:
         self._bind(state)
         require_state(self._limits, state.coil_c, state.intensity_pct_mso)
         require_set(self._noted, self._last_set_pct_rmt, state)
+        if not self._info.sets_intensity:  # else what it reports is not yet that of the pulse
+            require_at_most(self._limits.max_intensity_pct_rmt, self._noted, state)
         if self._dead_man is not None and self._dead_man() is not True:
             raise LimitExceededError(
                 "the dead man's switch is not held",

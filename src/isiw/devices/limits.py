@@ -29,7 +29,8 @@ class PulseLimits(Checked):
             report it. Where None, one that is reported has to be the visit's, or else the first one.
         max_consecutive_mistrials: a session pauses after so many rejected trials, or of a faulty rig, in a row.
         max_intensity_pct_rmt: the highest intensity that a device may be asked to set [% RMT]; None if it may be asked
-            to set none. Where one is stated, a reported intensity may change from pulse to pulse.
+            to set none. Where one is stated, a reported intensity may change from pulse to pulse, and where the visit
+            states the usual one in both units none above it is delivered.
 
     Raises:
         InvalidValueError: an invalid number, or both an only and a highest intensity.
