@@ -2,10 +2,12 @@ from __future__ import annotations
 
 import ast
 import importlib
+import pkgutil
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -22,6 +24,13 @@ def test_every_public_name_is_what_its_module_calls_so() -> None:
         home = HOMES[name]
         module = importlib.import_module(f"isiw.{home or name}")
         assert getattr(isiw, name) is (getattr(module, name) if home else module), name
+
+
+def test_what_uses_any_package_can_be_sent_to_workers() -> None:
+    # A package with a function of its module's name gets a class of lazy_loader's, which cannot be pickled.
+    packages = [name for _, name, has_modules in pkgutil.walk_packages(isiw.__path__, "isiw.") if has_modules]
+    assert "isiw.priors" in packages
+    assert [name for name in packages if type(importlib.import_module(name)) is not ModuleType] == []
 
 
 def test_the_version_is_that_of_the_package_and_of_the_citation() -> None:

@@ -58,8 +58,8 @@ from .session.afterwards import exclude as exclude
 from .session.afterwards import include as include
 from .session.loop import Session as Session
 from .session.recorder import Recorder as Recorder
-from .session.resume import open_session as open_session
-from .session.resume import resume as resume
+from .session.resuming import open_session as open_session
+from .session.resuming import resume as resume
 from .session.rig import Safeguards as Safeguards
 from .strategy.catalogue import list_settings as list_settings
 from .strategy.catalogue import list_strategies as list_strategies

@@ -12,7 +12,7 @@ from isiw.config.resume import changes_on_resume, differences_on_resume
 from isiw.devices.protocol import Readiness
 from isiw.log.record import SessionRecord, read_session
 from isiw.session.loop import Session
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from scripted import SPACE, ScriptedDevice, scripted_strategy
 
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from isiw.existing import Layout, ReadingLimits, reading
+from isiw.existing import Layout, ReadingLimits, looking, reading
 from isiw.existing.apart import Answer
-
-looking = importlib.import_module("isiw.existing.look")  # the module; isiw.existing.look is its function
 
 
 def _read_here(

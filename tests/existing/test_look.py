@@ -16,7 +16,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing.analysis import analyse
 from isiw.existing.layout import Layout
-from isiw.existing.look import look
+from isiw.existing.looking import look
 
 
 def test_markers_without_a_known_name_are_proposed_by_which_follows_which(tmp_path: Path) -> None:

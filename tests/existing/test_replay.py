@@ -10,7 +10,7 @@ import pytest
 import isiw
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import Delivered
-from isiw.existing.replay import replay
+from isiw.existing.replaying import replay
 
 SPACE = isiw.DesignSpace(0, 200, 5, reference="impact")
 FEW: dict[str, Any] = {"particles": 100}

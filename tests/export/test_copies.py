@@ -17,7 +17,7 @@ from isiw.export import Exported, export_logs
 from isiw.log.record import read_session
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
-from isiw.session.resume import open_session, resume
+from isiw.session.resuming import open_session, resume
 from logs import cut_after, damage
 from scripted import ScriptedDevice, scripted_strategy
 

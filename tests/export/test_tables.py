@@ -22,7 +22,7 @@ from isiw.log.headers import StrategyRecipe
 from isiw.log.record import read_session
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.visit import Visit
 from logs import cut_after
 from scripted import ScriptedDevice, scripted_strategy

@@ -15,7 +15,7 @@ from isiw.log.records import Onsets
 from isiw.log.schema import Event, Intent
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
-from isiw.session.resume import resume
+from isiw.session.resuming import resume
 from log.written import write_trials
 from scripted import ScriptedDevice, scripted_strategy
 

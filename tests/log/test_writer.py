@@ -17,7 +17,7 @@ from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Waveform
 from isiw.log.writer import LogWriter
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.sweeps import Channel
 from log.written import write_trials
 from logs import blocks_of, damage

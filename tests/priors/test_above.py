@@ -9,7 +9,7 @@ import isiw
 from isiw.errors import InvalidValueError
 from isiw.log.record import SessionRecord
 from isiw.models.particles.supra.prior import SupraPrior
-from isiw.priors.above import SAME_VISIT, above
+from isiw.priors.above_threshold import SAME_VISIT, above
 from isiw.visit import Visit
 from priors.logged import gaussian_person, write_log
 

@@ -21,7 +21,7 @@ from isiw.log.record import SessionRecord, read_session
 from isiw.priors import Difference
 from isiw.report.comparison import save_comparison
 from isiw.report.page import save_report
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.sweeps import Channel
 from known import known
 from report.sessions import HOSTILE, tapped

@@ -16,7 +16,7 @@ from isiw.findings import Kind
 from isiw.log import moments, writer
 from isiw.log.record import read_session
 from isiw.session.loop import Session
-from isiw.session.resume import open_session, resume
+from isiw.session.resuming import open_session, resume
 from isiw.session.rig import Safeguards
 from isiw.trials import Status, Trial
 from isiw.visit import VisitProtocol

@@ -21,7 +21,7 @@ from isiw.errors import DeviceError, NotDelivered
 from isiw.log.record import read_session
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
-from isiw.session.resume import resume
+from isiw.session.resuming import resume
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate
 from isiw.sweeps import Measurement

@@ -15,7 +15,7 @@ from isiw.errors import LogError
 from isiw.log.record import SessionRecord, read_session
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
-from isiw.session.resume import resume
+from isiw.session.resuming import resume
 from logs import blocks_of, damage
 from scripted import ScriptedDevice, scripted_strategy
 from session.crashes import Disk

@@ -15,7 +15,7 @@ from isiw.log.schema import EstimateRecord, decode
 from isiw.log.writer import encode
 from isiw.session.examination import estimate_record
 from isiw.session.loop import Session
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choice import Asked, candidate_isis
 from isiw.strategy.course import Course

@@ -19,7 +19,7 @@ from isiw.log.pulses import pulse_ages
 from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.session.loop import Session
-from isiw.session.resume import resume
+from isiw.session.resuming import resume
 from isiw.session.rig import STILL_ARMED, Safeguards
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import Stimulus

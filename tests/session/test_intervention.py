@@ -36,7 +36,7 @@ from isiw.server.live.view import View
 from isiw.session.afterwards import open_arm
 from isiw.session.blocks import Blocks
 from isiw.session.loop import Session
-from isiw.session.resume import open_session, resume
+from isiw.session.resuming import open_session, resume
 from isiw.session.rig import Safeguards
 from isiw.sweeps import Measurement
 from isiw.trials import Stimulus, Trial

@@ -14,7 +14,7 @@ import pytest
 
 from forked import run_and_end
 from isiw.log.record import SessionRecord, read_session
-from isiw.session.resume import resume
+from isiw.session.resuming import resume
 from known import known
 from scripted import ScriptedDevice, scripted_strategy
 

@@ -12,7 +12,7 @@ from isiw.devices.info import DeviceInfo
 from isiw.errors import LogError
 from isiw.log.record import read_session
 from isiw.session.loop import Session
-from isiw.session.resume import open_session, resume
+from isiw.session.resuming import open_session, resume
 from isiw.session.sink import SessionUpdate
 from isiw.session.threshold import open_threshold, read_threshold
 from isiw.strategy.threshold import IntensityRange, make_threshold_search

@@ -11,7 +11,7 @@ from isiw.devices.info import DeviceInfo
 from isiw.errors import StrategyError
 from isiw.log.record import read_session
 from isiw.session.loop import Session
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.session.sink import SessionUpdate
 from isiw.session.threshold import open_threshold, read_threshold
 from isiw.strategy.strategy import Strategy

@@ -17,7 +17,7 @@ from isiw.errors import InvalidValueError
 from isiw.log.record import read_session
 from isiw.report.words import final_statement, truth_sentence
 from isiw.session.loop import Session
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.strategy.catalogue import list_strategies, make_strategy
 from isiw.subjects.cohorts import person_of
 from isiw.visit import VisitProtocol

@@ -19,7 +19,7 @@ from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import Kind
 from isiw.log.record import read_session
 from isiw.session.loop import Session
-from isiw.session.resume import open_session, resume
+from isiw.session.resuming import open_session, resume
 from isiw.session.sink import SessionUpdate
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import Status, Stimulus

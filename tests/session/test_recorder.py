@@ -40,7 +40,7 @@ from isiw.session.afterwards import exclude
 from isiw.session.examination import relearned
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder
-from isiw.session.resume import open_session, resume
+from isiw.session.resuming import open_session, resume
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable
@@ -646,7 +646,7 @@ VICTIM = """
 import sys, time
 sys.path.insert(0, {tests!r})
 from scripted import scripted_strategy
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 
 session = open_session(scripted_strategy(9), {log!r})
 for _ in range(3):

@@ -12,7 +12,7 @@ from isiw.devices.deadlines import Deadlines
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LogError
 from isiw.log.record import read_session
 from isiw.session.loop import Session
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.session.rig import Safeguards
 from isiw.strategy.catalogue import make_strategy
 from isiw.visit import Visit

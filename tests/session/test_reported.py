@@ -17,7 +17,7 @@ from isiw.plots import session_figure
 from isiw.report import final_statement
 from isiw.session.afterwards import estimate_again, exclude
 from isiw.session.recorder import Recorder
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.summary import IN_DOUBT

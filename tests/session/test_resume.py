@@ -24,7 +24,7 @@ from isiw.log.writer import LogWriter
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.replay import strategy_of
-from isiw.session.resume import open_session, resume
+from isiw.session.resuming import open_session, resume
 from isiw.session.sink import SessionUpdate
 from isiw.strategy.catalogue import make_strategy, remade_strategy
 from isiw.strategy.strategy import Strategy

@@ -18,7 +18,7 @@ from isiw.decision import StopKind
 from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.pausing import Interrupts
-from isiw.session.resume import resume
+from isiw.session.resuming import resume
 from isiw.session.rig import INTERRUPTED, Safeguards
 from isiw.session.sink import SessionUpdate
 from isiw.sweeps import Measurement

@@ -15,7 +15,7 @@ from isiw.log.record import read_session
 from isiw.log.schema import Event, Intent
 from isiw.session import steps
 from isiw.session.loop import Session
-from isiw.session.resume import resume
+from isiw.session.resuming import resume
 from isiw.session.rig import Safeguards
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy

@@ -23,7 +23,7 @@ from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.report import final_statement
 from isiw.session.afterwards import exclude, include
 from isiw.session.loop import Session
-from isiw.session.resume import open_session, resume
+from isiw.session.resuming import open_session, resume
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate
 from isiw.strategy.catalogue import make_strategy

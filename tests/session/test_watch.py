@@ -20,7 +20,7 @@ from isiw.plots.session import session_figure
 from isiw.report import final_statement
 from isiw.session import progress_row
 from isiw.session.loop import Session
-from isiw.session.resume import resume
+from isiw.session.resuming import resume
 from isiw.session.rig import Safeguards
 from isiw.signals import SignalLimits
 from isiw.signals.watch import Watch

@@ -11,7 +11,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.outcomes import Outcome, Outcomes, found_step_mv
 from isiw.strategy.strategy import Strategy

@@ -21,7 +21,7 @@ from isiw.log.continuing import continued_by, require_session
 from isiw.log.headers import RUN_KEY, Header
 from isiw.log.record import SessionRecord, read_session
 from isiw.session.loop import Session
-from isiw.session.resume import limits_of_log
+from isiw.session.resuming import limits_of_log
 from isiw.strategy.catalogue import make_strategy
 from isiw.text.sanitize import command
 from isiw.text.toml_files import checked

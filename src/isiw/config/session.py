@@ -31,7 +31,7 @@ from isiw.log.writer import now
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.priors import above, after, read_lab_prior
-from isiw.priors.above import SAME_VISIT, profile_below
+from isiw.priors.above_threshold import SAME_VISIT, profile_below
 from isiw.priors.days import DayToDay, require_each_once, require_whole
 from isiw.session.given import given_pulses
 from isiw.session.loop import Session

@@ -7,8 +7,8 @@ from .analysis import analysed as analysed
 from .delivered import Delivered as Delivered
 from .layout import Layout as Layout
 from .limits import ReadingLimits as ReadingLimits
-from .look import Look as Look
-from .look import look as look
+from .looking import Look as Look
+from .looking import look as look
 from .reading import read_people as read_people
-from .replay import Replay as Replay
-from .replay import replay as replay
+from .replaying import Replay as Replay
+from .replaying import replay as replay

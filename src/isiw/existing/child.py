@@ -22,7 +22,7 @@ from isiw.existing import formats
 from isiw.existing.apart import Answer, write_answer, write_error
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits, limit, seconds_for
-from isiw.existing.look import seen_in
+from isiw.existing.looking import seen_in
 from isiw.existing.reading import contents_in, people_of_contents
 from isiw.files import hash_of
 from isiw.lazy import pd

@@ -1,5 +1,5 @@
 from . import file as file
-from .above import above as above
+from .above_threshold import above as above
 from .comparison import compared as compared
 from .comparison import densities as densities
 from .days import DayToDay as DayToDay

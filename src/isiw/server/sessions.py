@@ -21,7 +21,7 @@ from isiw.server.clients import logged_client, require_free
 from isiw.server.driven import DrivenSession, not_open
 from isiw.server.requests import NAME, CreateRequest, ResumeRequest
 from isiw.session.replay import strategy_of
-from isiw.session.resume import open_session
+from isiw.session.resuming import open_session
 from isiw.session.state import state_of
 from isiw.session.terminal import alarm
 from isiw.strategy.catalogue import known_settings, make_strategy

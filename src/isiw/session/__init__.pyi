@@ -7,8 +7,8 @@ from .console import progress_row as progress_row
 from .given import given_pulses as given_pulses
 from .loop import Session as Session
 from .recorder import Recorder as Recorder
-from .resume import open_session as open_session
-from .resume import resume as resume
+from .resuming import open_session as open_session
+from .resuming import resume as resume
 from .sink import SessionResult as SessionResult
 from .sink import SessionUpdate as SessionUpdate
 from .threshold import ThresholdRecorder as ThresholdRecorder
