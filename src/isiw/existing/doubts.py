@@ -48,7 +48,8 @@ def require_single_trials(
     mep: Column, isi: Column, others: Sequence[Column], frame: pd.DataFrame, reference: Reference | None
 ) -> None:
     """Raise if rows are means of several trials, or relative: their column says so, a title, or what is beside them."""
-    spreads = [one.name for one in others if says_only(one.name, WORDS["spreads"])]
+    # SDs of 0 alone are of single trials that isiw exported.
+    spreads = [one.name for one in others if says_only(one.name, WORDS["spreads"]) and any(one.numbers > 0)]
     numbers = [one for one in others if letters(one.name) in WORDS["numbers"]]
     counted_in = [one.name for one in numbers if 2 * len({*one.texts}) <= len(one.texts)
                   and all(text.isdigit() and int(text) > 1 for text in one.texts)]  # fmt: skip
@@ -66,7 +67,8 @@ def require_single_trials(
     require_title("\n".join([heading, *below]), mep, reference, frame.attrs.get("notes", ""))
     title = TITLES_OF_MEANS.search(words_of(heading)) if once else None
     is_counted = bool(counted_in) and (once or re.search("sweep|averag|mep", letters(counted_in[0])))
-    limits = [one for one in others if not np.allclose(one.numbers, mep.numbers, rtol=0.01)] if once else []
+    limits = [one for one in others if once and np.isfinite(one.numbers).all()]
+    limits = [one for one in limits if not np.allclose(one.numbers, mep.numbers, rtol=0.01)]
     for one, other in combinations(limits if len(others) < _BELOW else (), 2):  # such as those of confidence
         spreads += [one.name] if np.allclose(one.numbers + other.numbers, 2 * mep.numbers, rtol=0.01) else []
     if title or MEANS.search(words_of(mep.name)) or (spreads and (numbers or once)) or is_counted:
