@@ -84,7 +84,8 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
 
 
 def _estimated(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
-    pairs = sum(trial.isi_ms is not None for trial in _known_by(record, estimate.trial))
+    known = (*record.header.earlier, *_known_by(record, estimate.trial))
+    pairs = sum(trial.isi_ms is not None for trial in known)
     nothing = lacking(pairs, silent=record.is_silent, in_doubt=record.in_doubt)
     window = estimate.window if nothing is None else None
     said = [f"{nothing}"] if nothing is not None else _said(record, estimate)
