@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,19 @@ def test_a_session_that_is_exported_and_analysed_again_says_the_same_to_the_last
     assert [trial.isi_ms for trial in delivered.trials] == [trial.isi_ms for trial in measured.table]
     assert sum(trial.is_control for trial in delivered.trials) > 0
     assert [trial.excluded for trial in delivered.trials] == [trial.excluded for trial in measured.table]
+
+
+def test_an_export_of_single_trials_at_isis_of_their_own_is_read_as_what_it_is(tmp_path: Path) -> None:
+    with isiw.open_session(isiw.make_strategy("even", SPACE, 1, particles=50), log=tmp_path / "P1.mcap") as session:
+        for number in range(5):
+            session.tell(session.ask() + 0.1 * number, 0.1 + 0.01 * number)
+        session.tell(session.ask(), mep_interval_mv=(0.05, math.inf))
+    isiw.export.export_logs(tmp_path / "P1.mcap", tmp_path / "tables")
+    (delivered,) = read_people(tmp_path / "tables" / "trials.csv", Layout(reference=SPACE.reference))
+    trials = isiw.read_session(tmp_path / "P1.mcap").trials
+    assert delivered.trials[:5] == tuple(isiw.read_session(tmp_path / "P1.mcap").table)[:5]
+    assert trials["mep_low_mv"].tolist()[5] == 0.05
+    assert trials[["mep_low_mv", "mep_high_mv"]].notna().sum().tolist() == [1, 0]
 
 
 def test_an_imported_log_says_the_same_and_that_it_was_no_session(tmp_path: Path) -> None:

@@ -31,8 +31,8 @@ PLACE = Place(0.8, Scale(250.0, SPREAD_MS), Scale(90.0, 0.3))
 HEIGHT = Slope("height_cm", 175.0, 10.0, 9.0, 3.0)
 
 
-def learnt(correlation: float, people: int = 12, seed: int = 0) -> tuple[Slope, ...]:
-    """The slopes of people whose height is correlated with the start of their window."""
+def learnt(correlation: float, people: int = 12, seed: int = 0, others: int = 0) -> tuple[Slope, ...]:
+    """The slopes of people whose height goes with the start of their window, and others who do not state it."""
     rng = np.random.default_rng(seed)
     height = rng.standard_normal(people)
     other = math.sqrt(1 - correlation**2) * rng.standard_normal(people)
@@ -40,7 +40,8 @@ def learnt(correlation: float, people: int = 12, seed: int = 0) -> tuple[Slope, 
     measured = start_ms[:, None] + ERROR_MS * (rng.standard_normal((people, 1)) + rng.standard_normal((people, 300)))
     values = np.stack([measured, np.full_like(measured, math.log(90.0))], axis=-1)
     density = stats.norm.logpdf(values[..., 0], 250.0, USUAL_MS)
-    visits = [Visit(height_cm=175.0 + 10.0 * z, age_years=30.0) for z in height]
+    visits = [Visit(height_cm=175.0 + 10.0 * z, age_years=30.0) for z in height] + [Visit()] * others
+    values, density = (np.concatenate((each, each[:others])) for each in (values, density))
     block = LatentBlock(values, density, np.full(density.shape, fill_value=True))
     return slopes_of(visits, block, LAW, np.random.default_rng(1))
 
@@ -61,6 +62,11 @@ def test_a_height_that_tells_nothing_hardly_moves_a_prediction() -> None:
     shifts_ms = np.array([place.start_ms.law[0] - 250.0 for place in places])
     assert np.sqrt(np.mean(shifts_ms**2)) < 0.3 * SPREAD_MS
     assert all(0.8 * SPREAD_MS < place.start_ms.law[1] < 1.15 * SPREAD_MS for place in places)
+
+
+@pytest.mark.slow
+def test_people_who_state_no_height_say_nothing_of_what_it_explains() -> None:
+    assert learnt(0.85, others=8)[0].start_ms == pytest.approx(learnt(0.85)[0].start_ms)
 
 
 def test_of_few_people_nothing_is_learnt() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,10 @@ from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
+from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import recalled
+from isiw.session import open_session
 from isiw.session.afterwards import exclude
 from isiw.strategy.catalogue import make_strategy
 from isiw.types import Singles
@@ -225,3 +227,23 @@ def test_a_path_is_no_prior(first: Any) -> None:
     wrong: Any = "lab.toml"
     with pytest.raises(InvalidValueError, match=r"isiw.priors.load"):
         priors.after(first, prior=wrong)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("few_sweeps")
+def test_a_law_by_levels_teaches_nothing_of_the_kinds_of_noise(tmp_path: Path) -> None:
+    log, rng = tmp_path / "levels.mcap", np.random.default_rng(1)
+    levels = ((92.0, 0.02), (98.0, 0.05), (104.0, 0.06), (110.0, 0.5), (116.0, 0.55), (122.0, 2.0))
+    strategy = make_strategy("even", IMPACT_SPACE, 1, intensity_pct_rmt=90.0, particles=50)
+    with open_session(strategy, log=log, subject="P1") as session:
+        for pct_rmt, mep_mv in 8 * levels:
+            mep_mv *= float(np.exp(0.2 * rng.standard_normal()))  # noqa: PLW2901 - with noise
+            session.tell(None, mep_mv, intensity_pct_rmt=pct_rmt)
+        for mep_mv in (0.02, 0.03, 0.02):
+            session.tell(session.ask(), mep_mv)
+    record = read_session(log)
+    latents = recalled(record, Prior()).swarm.latents
+    assert (latents.noise == NoiseKind.BY_LEVELS).any()
+    for prior in (priors.after(record), priors.learn([log])):  # a person's particles are left as they are usual
+        assert sum(astuple(prior.noise)) == pytest.approx(1.0)
+        assert prior.noise.all_or_none == pytest.approx(Prior().noise.all_or_none, abs=0.06)

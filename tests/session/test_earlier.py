@@ -72,6 +72,9 @@ def test_a_session_that_goes_on_knows_them_still(tmp_path: Path) -> None:
     record = isiw.read_session(log)
     said = f"{len(record.header.earlier)} earlier trials were learnt first."
     assert isiw.report.words.counts_sentence(record).endswith(said)
+    assert record.pairs == session.estimate().pairs == len(record.header.earlier) + 1
+    assert record.rests_on_data
+    assert "Fewer than three" not in isiw.report.drawn.drawn(record)["beliefs"][0]["found"]
 
 
 @pytest.mark.parametrize("no_trials", [pd.DataFrame({"isi_ms": [40.0], "mep_mv": [0.1]}), "P01.mcap", 7])

@@ -89,6 +89,15 @@ def test_a_rule_remembers_as_much_as_it_looks_back_on() -> None:
     assert remembered == [0, 1, 2, 2, 2]
 
 
+def test_a_rule_never_looks_back_on_trials_before_the_session_however_often_they_are_learnt() -> None:
+    seen = (Observation.of([200.0], [0.02]), Observation.of([None], [0.02]))
+    first = course("even", 1, model=make_strategy("even", particles=20).model)
+    later = first.after(seen[0]).after(seen[1]).begun_here().after(seen[0])
+    again = later.again(0, (*seen, None, seen[0]))
+    counts = [(one.told, one.alone, one.known, one.known_all, len(one.past)) for one in (later, again)]
+    assert counts == [(1, 0, 1, 2, 1)] * 2
+
+
 def test_a_rule_that_does_not_look_back_remembers_nothing() -> None:
     assert told(course("nr", stopping=Budget(3))).past == ()
 

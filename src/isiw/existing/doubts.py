@@ -52,7 +52,8 @@ def require_single_trials(
     mep: Column, isi: Column, others: Sequence[Column], frame: pd.DataFrame, reference: Reference | None
 ) -> None:
     """Raise if rows are means of several trials, or relative: their column says so, a title, or what is beside them."""
-    spreads = [one.name for one in others if says_only(one.name, WORDS["spreads"])]
+    # SDs of 0 alone are of single trials that isiw exported.
+    spreads = [one.name for one in others if says_only(one.name, WORDS["spreads"]) and any(one.numbers > 0)]
     numbers = [one for one in others if letters(one.name) in WORDS["numbers"]]
     counted_in = [one.name for one in numbers if 2 * len({*one.texts}) <= len(one.texts)
                   and all(text.isdigit() and int(text) > 1 for text in one.texts)]  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -34,6 +34,8 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "isi_ms": ("ms", "the realised ISI"),
     "isi_sd_ms": ("ms", "SD of the realised ISI; 0 if it was measured"),
     "mep_mv": ("mV", "peak-to-peak amplitude of the MEP; 0 is below the detection limit"),
+    "mep_low_mv": ("mV", "lower end of the interval that it lies in, if no more is known"),
+    "mep_high_mv": ("mV", "upper end of that interval; empty if it has none"),
     "mep_sd_mv": ("mV", "SD of the amplitude, as what {0.one} alone evokes varies"),
     "tap_mv": ("mV", "what is left in it of what {0.one} alone evokes, in the mean; empty if that is not known"),
     "mep_onset_ms": ("ms", "onset of the MEP after the magnetic pulse; empty without a sweep or an MEP"),
@@ -46,10 +48,7 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "t_tms_ms": ("ms", "the magnetic pulse, on the sweep's clock"),
     "excluded": ("", "whether an operator excluded it afterwards"),
     "tap_alone": ("", "whether it was {0.one} without the magnetic pulse"),
-    "intensity_pct_rmt": (
-        "%",
-        "intensity of the pulse, of the resting motor threshold; empty for the usual one of the pairs",
-    ),
+    "intensity_pct_rmt": ("%", "intensity of the pulse, of the resting motor threshold; empty: as usual for the pairs"),
     "overruled": ("", "why it had been a mistrial before an operator accepted it"),
     "p_window": ("", "probability that there is a window, after this trial"),
     "window_start_ms": ("ms", "start of the window that was reported after this trial; empty if none was"),
@@ -103,8 +102,9 @@ def trial_frame(record: LoggedSession) -> pd.DataFrame:
 
 
 def _outcome(trial: Trial) -> dict[str, Any]:
-    values = {field.name: getattr(trial, field.name) for field in dataclasses.fields(Trial) if field.name != "index"}
-    return values | {name: None if values[name] is None else str(values[name]) for name in _TEXTS}
+    low_mv, high_mv = trial.mep_interval_mv or (None, None)
+    texts = {name: None if (value := getattr(trial, name)) is None else str(value) for name in _TEXTS}
+    return vars(trial) | texts | {"mep_low_mv": low_mv, "mep_high_mv": None if high_mv == math.inf else high_mv}
 
 
 def _estimated(estimate: EstimateRecord | None) -> dict[str, Any]:

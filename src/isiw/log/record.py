@@ -84,8 +84,8 @@ class SessionRecord(LoggedSession):
 
     @property
     def pairs(self) -> int:
-        """The number of pairs of stimuli that count; trials with TMS alone do not."""
-        return sum(trial.isi_ms is not None for trial in self.table.told)
+        """The number of pairs of stimuli that count, those learnt first among them; trials with TMS alone do not."""
+        return sum(trial.isi_ms is not None for trial in (*self.header.earlier, *self.table.told))
 
     @property
     def is_silent(self) -> bool:

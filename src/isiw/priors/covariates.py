@@ -74,7 +74,7 @@ def slopes_of(visits: Sequence[Visit], block: LatentBlock, law: Law, rng: np.ran
     drawn = CORRELATION_SD * rng.standard_normal((DRAWS, len(names)))
     drawn *= rng.random(drawn.shape) < P_MATTERS
     drawn = drawn[(drawn**2).sum(1) < MOST_EXPLAINED]
-    log_weight = np.sum([_log_likelihoods(block, row, law, drawn @ z[row], drawn) for row in range(len(z))], axis=0)
+    log_weight = np.sum([_log_likelihoods(block, row, law, z[row], drawn) for row in range(len(z))], axis=0)
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
     mean = weight @ drawn
@@ -87,7 +87,7 @@ def slopes_of(visits: Sequence[Visit], block: LatentBlock, law: Law, rng: np.ran
 
 
 def _standardised(visits: Sequence[Visit]) -> tuple[list[str], FloatArray, dict[str, tuple[float, float]]]:
-    """The covariates that differ between enough people, as z scores, (n, k), 0 where not stated, and their scales."""
+    """The covariates that differ between enough people, as z scores, (n, k), NaN where not stated, and their scales."""
     scales: dict[str, tuple[float, float]] = {}
     columns = []
     for name in COVARIATES:
@@ -95,15 +95,20 @@ def _standardised(visits: Sequence[Visit]) -> tuple[list[str], FloatArray, dict[
         known = stated[~np.isnan(stated)]
         if len(known) >= LEAST_PEOPLE and (sd := float(known.std(ddof=1))) > 0:
             scales[name] = float(known.mean()), sd
-            columns.append(np.nan_to_num((stated - known.mean()) / sd))
+            columns.append((stated - known.mean()) / sd)
     return list(scales), np.array(columns).T, scales
 
 
-def _log_likelihoods(block: LatentBlock, row: int, law: Law, shift: FloatArray, drawn: FloatArray) -> FloatArray:
-    """One person's log likelihood under each of the drawn correlations, (m,), as in `population`."""
+def _log_likelihoods(block: LatentBlock, row: int, law: Law, noted: FloatArray, drawn: FloatArray) -> FloatArray:
+    """One person's log likelihood under each of the drawn correlations, (m,), as in `population`.
+
+    What is not noted of the person, NaN among the z scores (k,), explains nothing of the start.
+    """
+    known = ~np.isnan(noted)
+    drawn = drawn[:, known]
     left = np.sqrt(1.0 - (drawn**2).sum(1))
     z = (block.values[row] - law.mean) / law.sd  # (i, 2)
-    about = (z[:, :1] - shift) / left  # (i, m)
+    about = (z[:, :1] - drawn @ noted[known]) / left  # (i, m)
     log_law = -0.5 * (about**2 + z[:, 1:] ** 2) - np.log(left) - np.log(law.sd).sum() - np.log(2 * np.pi)
     ratio = log_law - block.log_density[row][:, None] + math.log(1 - P_OUTSIDER)
     weight = np.where(block.used[row][:, None], np.logaddexp(math.log(P_OUTSIDER), ratio), 0.0)

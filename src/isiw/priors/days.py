@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import astuple, dataclass, replace
 from functools import partial, reduce
 from typing import Annotated, Final, TypeAlias
 
@@ -267,24 +267,25 @@ def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
     profile = replace(
         usual.profile,
         p_window=mixed(p_window, usual.profile.p_window, law.p_other),
-        shapes=mixed_shares(_shares(latents.shape[latents.present], len(fields(shapes))), shapes, law.p_other),
+        shapes=mixed_shares(_shares(latents.shape[latents.present], astuple(shapes)), shapes, law.p_other),
         places=beside(usual.profile.places, _laws(latents, "place", own_place, law)),
     )
     return replace(
         usual,
         profile=profile,
         changes=replace(usual.changes, noted=()),  # which were that day's
-        noise=mixed_shares(_shares(latents.noise, len(fields(kinds))), kinds, law.p_other),
+        noise=mixed_shares(_shares(latents.noise, astuple(kinds)), kinds, law.p_other),
         floors=beside(usual.floors, _laws(latents, "floor", floor, law)),
         gains=beside(usual.gains, _laws(latents, "gain", gain, law)),
         muscles=beside(usual.muscles, _laws(latents, "muscle", partial(muscle, name="as before"), law)),
     )
 
 
-def _shares(kinds: IntArray, of: int) -> list[float]:
-    """Shares of the kinds, counting one more particle that is of all kinds."""
-    counts = np.bincount(kinds.ravel(), minlength=of) + 1.0 / of
-    shares: list[float] = (counts / counts.sum()).tolist()
+def _shares(kinds: IntArray, usual: Sequence[float]) -> list[float]:
+    """Shares of the kinds, counting one more particle that is of all kinds; a law by levels leaves them as usual."""
+    of, counts = len(usual), np.bincount(kinds.ravel(), minlength=len(usual))
+    counted = counts[:of] + 1.0 / of + counts[of:].sum() * np.array(usual)
+    shares: list[float] = (counted / counted.sum()).tolist()
     return shares
 
 

@@ -13,6 +13,7 @@ from isiw.log.codes import is_same_person
 from isiw.log.record import SessionRecord, require_records
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import moved, recalled, too_far_apart_ms
+from isiw.summary import ENOUGH_PAIRS
 from isiw.types import FloatArray
 
 _Session: TypeAlias = tuple[SessionRecord, FloatArray | None]
@@ -69,7 +70,8 @@ def differences(records: Sequence[SessionRecord]) -> list[Difference]:
 
 def _edges(record: SessionRecord) -> FloatArray | None:
     """Samples of start and end, given a window [ms]; None if too few trials count, or there is probably none."""
-    if not record.rests_on_data:
+    own = sum(trial.isi_ms is not None for trial in record.table.told)  # only these are learnt here
+    if not record.rests_on_data or own < ENOUGH_PAIRS:
         return None
     estimate = recalled(record, Prior()).estimate()
     return estimate.edge_samples_ms if (estimate.probability or 0.0) >= 0.5 else None

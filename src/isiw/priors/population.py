@@ -20,6 +20,7 @@ from isiw.models.particles import ParticlePosterior
 from isiw.models.particles.jumps import law_of
 from isiw.models.particles.latents import latents_of, used_by
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
+from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ShapeShares
@@ -258,7 +259,8 @@ def _person(posterior: ParticlePosterior) -> tuple[dict[str, LatentBlock], dict[
         for name in LATENT_BLOCKS
     }
     shape = np.where(latents.present, latents.shape, -1)
-    kinds = {"window": latents.present.astype(np.int64), "shape": shape, "noise": latents.noise}
+    noise = np.where(latents.noise == NoiseKind.BY_LEVELS, -1, latents.noise)  # of which people have no share
+    kinds = {"window": latents.present.astype(np.int64), "shape": shape, "noise": noise}
     return blocks, {name: kind[0] if posterior.pairs else np.full_like(kind[0], -1) for name, kind in kinds.items()}
 
 

@@ -98,7 +98,8 @@ def _estimated(
 
     An intervention knows its window from the search before it.
     """
-    pairs = None if header.intervention else sum(trial.isi_ms is not None for trial in known)
+    of_all = (*header.earlier, *known)
+    pairs = None if header.intervention else sum(trial.isi_ms is not None for trial in of_all)
     nothing = lacking(pairs, silent=silent, in_doubt=in_doubt)
     window = estimate.window if nothing is None else None
     said = [f"{nothing}"] if nothing is not None else _said(header, estimate, known)

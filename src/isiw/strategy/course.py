@@ -111,8 +111,8 @@ class Course:
         course = self.method.begin(seed, self.people)
         for observation in observations:
             course = course.noting_change() if observation is None else course.after(observation)
-        told, alone = course.told - self.known_all, course.alone - (self.known_all - self.known)
-        return replace(course, told=told, alone=alone, known=self.known, known_all=self.known_all)
+            course = course.begun_here() if course.told == self.known_all and not course.known_all else course
+        return course
 
     def after(self, observation: Observation) -> Course:
         """The course after one more trial of each person; all of them pairs of stimuli, or all TMS alone."""
