@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # audiogram's "WHO 2021" grades are not those of WHO 2021: 22 dB is normal for mild, 38 dB mild for moderate, 96 dB profound for complete.
 #
-# Expected: docstring of severity_from_pta: "Uses WHO 2021 grading". World Report on Hearing (WHO 2021), table 1.3: normal below 20 dB HL, mild
+# Expected: docstring of severity_from_pta: "Uses WHO 2021 grading". World Report on Hearing (WHO 2021): normal below 20 dB HL, mild
 #   to below 35, moderate to below 50, moderately severe to below 65, severe to below 80, profound to below 95, complete from 95.
 # Seen: the limits are 25, 40, 55, 70 and 90 dB HL, which are older ones (Clark 1981), and there is no grade of complete loss. Half of all
-#   values from 20 to 100 dB have a grade lower than WHO's, none has a higher one.
+#   values from 20 to 105 dB have a grade lower than WHO's, none has a higher one.
 # Hurts: prevalences and referrals under WHO's name: the loss from which WHO counts a person as impaired begins 5 dB too late.
 set -euo pipefail
 tmp=$(mktemp -d)

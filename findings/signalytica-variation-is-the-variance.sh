@@ -2,7 +2,7 @@
 # signalytica's coefficient of variation is the variance: in uV it is a million times that in mV, and a mean of 100 does not count.
 #
 # Expected: its source and list of features: "Coefficient of variation", that is the standard deviation divided by the mean, a number without
-#   unit (Pearson 1896; ISO 3534-1, 2.38).
+#   unit (Pearson 1896).
 # Seen: coeff_var returns the variance, the same number as the feature "activity_hjorth_param". In the example of its own documentation both
 #   are 0.9296511098623816.
 # Hurts: whoever compares the variability of MEPs or EEG features between persons or units: 0.36 for 0.30 in mV, 360000 in uV.
