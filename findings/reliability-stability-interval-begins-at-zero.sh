@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# reliability-stability-calc sets the lower limit of a difference to zero: an interval of -0.42 to -0.25 is printed as "0.0 and -0.22".
+# reliability-stability-calc sets the lower limit of a difference to zero: an interval of -0.41 to -0.25 is printed as "0.0 and -0.21".
 #
 # Expected: documentation: "implement a bootstap test to test assumptions", with a percentile interval for assumption_test, a difference of two
 #   transformed products of correlations that is zero if Heise's (1969) assumption holds, and changes its sign if two columns are exchanged.
