@@ -74,7 +74,7 @@ def test_an_export_of_single_trials_at_isis_of_their_own_is_read_as_what_it_is(t
     isiw.export.export_logs(tmp_path / "P1.mcap", tmp_path / "tables")
     (delivered,) = read_people(tmp_path / "tables" / "trials.csv", Layout(reference=SPACE.reference))
     trials = isiw.read_session(tmp_path / "P1.mcap").trials
-    assert delivered.trials[:5] == tuple(isiw.read_session(tmp_path / "P1.mcap").table)[:5]
+    assert list(delivered.trials)[:5] == list(isiw.read_session(tmp_path / "P1.mcap").table)[:5]
     assert trials["mep_low_mv"].tolist()[5] == 0.05
     assert trials[["mep_low_mv", "mep_high_mv"]].notna().sum().tolist() == [1, 0]
 
