@@ -39,7 +39,7 @@ from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ShapeShares
 from isiw.models.shared.scales import Scale
 from isiw.priors import LabPrior
-from isiw.priors.lab import share_of
+from isiw.priors.lab import LEAST_USUAL, LearntSession, share_of
 from isiw.priors.population import LatentBlock, People, hyper_prior, place
 from isiw.priors.population import learnt as law_of
 from isiw.studies import SimulatedSession, simulate
@@ -48,7 +48,7 @@ from isiw.subjects.measured import LABS, Lab, lab
 
 MARKS = (1, 5, 10, 20, 40)
 PRIORS = ("built-in", "learnt", "told", "windows known")
-TOLD_SHARE = 0.95
+TOLD_SHARE = 1.0 - LEAST_USUAL
 CERTAIN = -1e6
 """Log density of windows that are certainly of the lab under the prior of people in general."""
 LEARNT, EARLIER_TRIALS = 10, 40
@@ -83,7 +83,7 @@ def told(law: Lab) -> Prior:
     start_ms = law.start_ms[0] + law.hit_delay_ms[0]
     slope = 0.30
     return LabPrior(
-        sessions=(),
+        sessions=(LearntSession("", "everybody", 1),),  # a prior is always learnt from something
         p_window=0.98,
         shapes=ShapeShares(0.97, 0.01, 0.01, 0.01),
         noise=NoiseShares(0.02, 0.01, 0.96, 0.01, 0.0),
