@@ -295,7 +295,7 @@ def described(info: DeviceInfo | Mapping[str, Any], **known: Any) -> DeviceInfo:
     stated = from_table(DeviceInfo, info, "info")
     if stated.sets_intensity:
         raise InvalidValueError(
-            "this device cannot be told the intensity of a pulse, so each would have the one that is set",
+            "no intensity can be sent to this device, so that each pulse has that of the stimulator",
             got="sets_intensity in info",
             remedy="Leave it out, and have one intensity; only a device of your own can set several.",
         )
