@@ -117,7 +117,7 @@ def run_part(plan: Plan, part: Part, cohort: str, on_done: Callable[[str], None]
         on_done: called with the name of each unit that is finished.
 
     Raises:
-        SystemExit: a session failed, or what was kept is of another comparison.
+        SystemExit: a session failed.
     """
     if (part.cohorts and cohort not in part.cohorts) or (cohort == RECORDED and not recordings().is_dir()):
         return
