@@ -20,7 +20,6 @@ from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind
-from isiw.log.places import log_exists
 from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Intent
 from isiw.models.particles import ParticleModel
@@ -362,30 +361,26 @@ def test_without_a_writable_log_nothing_is_delivered(log: Path, monkeypatch: pyt
 # Where it comes while a weak reference is cleared, Python prints it and goes on; the session ends all the same.
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("delay_s", [0.005, 0.05, 0.12, 0.2])
-def test_ctrl_c_at_any_time_leaves_an_intact_log(log: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float) -> None:
-    device = ScriptedDevice()
-    session = Session(
-        device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, min_iti_s=0.0, max_pulses=100_000)
-    )
-    stage = device.stage
-
+def test_ctrl_c_at_any_time_leaves_an_intact_log(log: Path, delay_s: float) -> None:
     def interrupt() -> None:
-        # Not before the log is there, however slow the disk is: without a log nothing is delivered.
-        for _ in range(10_000):
-            if log_exists(log):
-                break
-            time.sleep(0.001)
         time.sleep(delay_s)
         os.kill(os.getpid(), signal.SIGINT)
 
     timer = threading.Thread(target=interrupt)
 
-    def stage_and_start() -> None:
-        # Not before the session runs, whatever else the machine does: outside it, Ctrl-C would end the tests.
-        stage()
-        timer.start()
+    device = ScriptedDevice()
+    formula = device.answer
 
-    monkeypatch.setattr(device, "stage", stage_and_start)
+    def answer(stimulus: Stimulus) -> object:
+        # From the first stimulus on: before it, where nothing was delivered, a session ends without a log, too.
+        if timer.ident is None:
+            timer.start()
+        return formula(stimulus)
+
+    device.answer = answer
+    session = Session(
+        device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, min_iti_s=0.0, max_pulses=100_000)
+    )
     with pytest.raises(KeyboardInterrupt):
         session.run()
     timer.join()
