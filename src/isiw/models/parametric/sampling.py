@@ -17,6 +17,9 @@ from isiw.models.parametric.normal import log_standard
 from isiw.models.parametric.tensors import Tensor, Trials
 from isiw.models.shared.draws import systematic
 
+TOGETHER: Final = 8000
+"""Likelihoods of a trial that are worked out at once: more than these do not stay in a processor's cache."""
+
 TREE_DEPTH: Final = 6
 """Latents are of the order of one: 63 leaps reach far enough, and a chain between two modes stays affordable."""
 
@@ -48,7 +51,9 @@ class WindowProgram:
 
     def log_density(self, latents: Tensor, trials: Trials) -> Tensor:
         """Log density of the program's trace for each of many latents (m, d), shape (m,)."""
-        return log_standard(latents) + self.log_likelihood(latents, trials)
+        few = max(TOGETHER // max(len(trials.isi_ms), 1), 1)
+        log_likelihood = [self.log_likelihood(part, trials) for part in torch.split(latents, few)]
+        return log_standard(latents) + torch.cat(log_likelihood)
 
     def log_likelihood(self, latents: Tensor, trials: Trials) -> Tensor:
         """Log likelihood of the trials under each of many latents (m, d), shape (m,)."""
