@@ -90,7 +90,7 @@ QUICK: Final[Mapping[str, str]] = {
     "trial_way": "",
     "two_steps": "--people 1 --out OUT",
     "vane": "--out OUT",
-    "waveform_loop": "--people 2 --sessions 1 --trials 15",
+    "waveform_loop": "--reference valve --people 2 --sessions 1 --trials 15",
     "zero_trials": "--people 20",
 }
 """What `--quick` stands for, by benchmark and command; OUT is the benchmark's name in `FOLDER`."""
