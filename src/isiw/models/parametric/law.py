@@ -19,6 +19,7 @@ from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.parametric.normal import log_between
 from isiw.models.parametric.tensors import Tensor
+from isiw.models.shared.draws import NEARLY_NOTHING
 from isiw.models.shared.scales import AnyScale, PositiveScale, Scale
 from isiw.models.shared.start import Knots, Span, StartPrior
 
@@ -159,9 +160,6 @@ OUTLIER_FLOORS: Final = 12.0
 OUTLIER_LOG_SD: Final = 1.3
 """Outliers are log-normal, with this multiple of the floor as their median and this log SD."""
 
-NEARLY_NOTHING: Final = -80.0
-"""Log of a share of a sum that single precision does not see."""
-
 _EVER: Final = 50.0
 """No MEP is as large or as small [log mV]."""
 
@@ -214,10 +212,7 @@ def _mixed(log_terms: Tensor, likelihood: Likelihood) -> Tensor:
 
 
 def _log_sum(log_terms: Tensor) -> Tensor:
-    """Log of the sum of what logarithms along the first dimension stand for; terms that are as good as 0 are cut.
-
-    Powers of e that are nearly 0 take torch 15 times as long as others.
-    """
+    """Log of the sum of what logarithms along the first dimension stand for."""
     top = log_terms.detach().amax(0).clamp_min(torch.finfo(log_terms.dtype).min)
     return torch.log(torch.exp((log_terms - top).clamp_min(NEARLY_NOTHING)).sum(0)) + top
 

@@ -16,6 +16,9 @@ LEVELS: Final = 24
 OUTCOMES: Final = 24
 """Cells of the log MEP in which predictive distributions live."""
 
+NEARLY_NOTHING: Final = -80.0
+"""Log of a share of a sum that single precision does not see; powers of e below it take torch 15 times as long."""
+
 SIMULATED: Final = 2**31
 NOTED: Final = 2**30
 TAUGHT: Final = 2**29
