@@ -229,7 +229,7 @@ class Rig:
         self.is_armed = True  # before it is, so that nobody takes it for disarmed who looks meanwhile
         with self.interrupts.allowed():
             self.limited.stage()
-        self.staged_once = True
+            self.staged_once = True
 
     def disarm(self) -> None:
         """Disarm, from any thread; if that cannot be done, the process ends."""
