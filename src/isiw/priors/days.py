@@ -28,6 +28,7 @@ from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
 from isiw.priors.population import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
+from isiw.signals.plausible import is_silent
 from isiw.strategy.outcomes import Outcomes
 from isiw.text.sanitize import command
 from isiw.trials import Trial
@@ -71,7 +72,11 @@ def require_meps(record: SessionRecord) -> None:
     record.require_read("seed", "strategy", "device", "visit", "subject")
     require_search(record.path, record.header)
     silent = "no MEP to learn from: every amplitude is 0, below the detection limit"
-    lacking = silent if record.is_silent else None if record.table.told else "no accepted trial to learn from"
+    told = record.table.told  # whatever was learnt before it
+    if is_silent([trial.mep_mv for trial in told if trial.mep_mv is not None], record.header.detection_limit_mv):
+        lacking: str | None = silent
+    else:
+        lacking = None if told else "no accepted trial to learn from"
     if lacking is not None:
         raise LogError(f"the session has {lacking}", got=str(record.path), remedy="Leave this log out.")
 
