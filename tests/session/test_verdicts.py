@@ -343,7 +343,11 @@ def test_a_trial_is_named_by_a_whole_number(log: Path, number: Any) -> None:
 
 @pytest.mark.parametrize(
     "again",
-    [lambda log: exclude(log, 4, "a cough"), lambda log: include(log, 2), estimate_again],
+    [
+        lambda log: exclude(log, 4, "a cough"),
+        lambda log: include(log, 2),
+        lambda log: estimate_again(log, scripted_strategy(8)),
+    ],
     ids=["exclude", "include", "estimate"],
 )
 def test_a_closed_log_to_which_a_full_disk_adds_nothing_stays_as_it_was(
