@@ -16,7 +16,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import doubtful_numbers, doubts, formats, frames, recordings
 from isiw.existing.apart import read_apart
-from isiw.existing.cells import dates_of, is_missing, latest_of
+from isiw.existing.cells import dates_of, days_of, is_missing, latest_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered, spelt_otherwise
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
@@ -191,7 +191,8 @@ def _by_text(texts: Iterable[str], rows: Iterable[int]) -> dict[str, list[int]]:
 def _days(columns: Columns, rows: list[int], dates: Mapping[int, dt.datetime]) -> dict[int | None, list[int]]:
     """The rows of each day, by a column of days, or by several dates; days without a number are counted."""
     named = "day" in columns.of
-    texts = [columns["day"].text(row) if named else f"{dates[row].date()}" if row in dates else "" for row in rows]
+    days_by_date = days_of({row: dates[row] for row in rows if row in dates})
+    texts = [columns["day"].text(row) if named else days_by_date.get(row, "") for row in rows]
     days = _by_text(texts, rows)
     several = len(days.keys() - {""}) > 1
     if "" in days and (several or (named and any(days))):

@@ -22,7 +22,7 @@ from isiw.report.tables import first_facts
 from isiw.report.words import counts_sentence, findings
 from isiw.text.sanitize import one_line
 
-HEADINGS = ("session", "subject", "begun", "trials", "P(window)", "window", "start", "end")
+HEADINGS = ("session", "subject", "begun (UTC)", "trials", "P(window)", "window", "start", "end")
 """The columns of the table."""
 
 
