@@ -71,12 +71,13 @@ def test_an_export_of_single_trials_at_isis_of_their_own_is_read_as_what_it_is(t
         for number in range(5):
             session.tell(session.ask() + 0.1 * number, 0.1 + 0.01 * number)
         session.tell(session.ask(), mep_interval_mv=(0.05, math.inf))
+        session.tell(session.ask(), mep_interval_mv=(0.0, 0.05))
     isiw.export.export_logs(tmp_path / "P1.mcap", tmp_path / "tables")
     (delivered,) = read_people(tmp_path / "tables" / "trials.csv", Layout(reference=SPACE.reference))
-    trials = isiw.read_session(tmp_path / "P1.mcap").trials
-    assert list(delivered.trials)[:5] == list(isiw.read_session(tmp_path / "P1.mcap").table)[:5]
-    assert trials["mep_low_mv"].tolist()[5] == 0.05
-    assert trials[["mep_low_mv", "mep_high_mv"]].notna().sum().tolist() == [1, 0]
+    record = isiw.read_session(tmp_path / "P1.mcap")
+    assert list(delivered.trials) == list(record.table)
+    assert record.trials[["mep_low_mv", "mep_high_mv"]].notna().sum().tolist() == [2, 1]
+    assert [row[2] for row in isiw.report.words.trial_rows(record)][-2:] == ["above 50 µV", "0–50 µV"]
 
 
 def test_an_imported_log_says_the_same_and_that_it_was_no_session(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
@@ -243,18 +244,26 @@ def _trial(columns: Columns, row: int, number: int, space: DesignSpace, signals:
         "isi_ms": isi_ms,
         "isi_sd_ms": columns["isi_sd"].number(row) or 0.0,
         "mep_mv": mep_mv,
+        "mep_interval_mv": _interval_mv(columns, row) if mep_mv is None else None,
         "background_rms_uv": columns["background"].number(row),
         "excluded": "status" in columns.of and columns.excluded(row),
     }
     if columns.tap_alone(row):
         return Trial(number, Status.ACCEPTED, tap_alone=True, **{**facts, "commanded_isi_ms": None})
-    if lost is None and (mep_mv is None or (isi_ms is None and asked_ms is not None)):
+    is_unknown = mep_mv is None and facts["mep_interval_mv"] is None
+    if lost is None and (is_unknown or (isi_ms is None and asked_ms is not None)):
         lost = Kind.OUTCOME_UNKNOWN
     if lost is None and not {"status", "exclude"} & columns.of.keys() and mep_mv is not None:
         meant_ms = asked_ms if "asked" in columns.of or isi_ms is None else max(isi_ms, 0.0)
         measured = Measurement(mep_mv, isi_ms, facts["isi_sd_ms"], None)
         lost = judge_measurement(measured, Stimulus(number, meant_ms), space, signals).reason
     return Trial(number, Status.ACCEPTED if lost is None else Status.MISTRIAL, reason=lost, **facts)
+
+
+def _interval_mv(columns: Columns, row: int) -> tuple[float, float] | None:
+    """The interval in which an amplitude lies of which no more is known; None if its ends are not said."""
+    low_mv, high_mv = columns["mep_low"].number(row), columns["mep_high"].number(row)
+    return None if low_mv is None and high_mv is None else (low_mv or 0.0, math.inf if high_mv is None else high_mv)
 
 
 def _with_intensities(trials: Sequence[Trial], columns: Columns) -> tuple[list[Trial], float | None]:
