@@ -195,7 +195,7 @@ classdef isiw < handle
     end
 
     function answer = call(this, send)
-      % Send until it is answered; wait where the server says how long.
+      % Send until it is answered, some times; wait where the server says how long, also for a long rest.
       attempt = 1;
       while true
         try
@@ -212,9 +212,11 @@ classdef isiw < handle
         if answer.ok
           return
         end
-        if isempty(answer.error.retry_s)
+        rests = strcmp(answer.error.type, 'TooEarly');
+        if isempty(answer.error.retry_s) || (attempt >= this.attempts && ~rests)
           error(['isiw:' answer.error.type], '%s', answer.error.message);
         end
+        attempt = attempt + ~rests;
         pause(answer.error.retry_s);
       end
     end

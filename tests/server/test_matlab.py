@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -28,6 +34,34 @@ def octave(client: httpx.Client, *arguments: str) -> subprocess.CompletedProcess
         check=False,
         timeout=120,
     )
+
+
+@contextmanager
+def answering(answer: Callable[[], dict[str, Any]]) -> Iterator[httpx.Client]:
+    """A client of a server that answers every call so."""
+
+    class Answering(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            self.rfile.read(int(self.headers["Content-Length"]))
+            body = json.dumps(answer()).encode()
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_: object) -> None:
+            """Nothing is shown."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Answering)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        with httpx.Client(base_url=f"http://127.0.0.1:{server.server_port}") as client:
+            yield client
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
 
 
 @pytest.mark.slow
@@ -208,3 +242,25 @@ def test_what_is_refused_is_an_error_in_words_and_can_be_put_right(tmp_path: Pat
     first, second, third, words, trials = ran.stdout.splitlines()
     assert (first, second, third, trials.strip()) == ("isiw:Unauthorized", "isiw:NoSuchSession", "isiw:TrialOpen", "3")
     assert "mep_mv" in words
+
+
+BUSY = """
+lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+try, lab.create('P07'); catch problem, disp(problem.identifier); end
+"""
+
+
+@pytest.mark.parametrize(("kind", "calls"), [("Busy", 10), ("Overloaded", 10), ("TooEarly", 30)])
+def test_only_for_a_rest_is_waited_longer_than_ten_answers(tmp_path: Path, kind: str, calls: int) -> None:
+    (tmp_path / "busy.m").write_text(BUSY)
+    answered = []
+
+    def busy() -> dict[str, Any]:
+        answered.append(kind)
+        retry_s = 0.01 if len(answered) < 30 else None
+        return {"ok": False, "error": {"type": kind, "message": "not now", "retry_s": retry_s}}
+
+    with answering(busy) as client:
+        ran = octave(client, str(tmp_path / "busy.m"))
+    assert ran.stdout.split() == [f"isiw:{kind}"], ran.stderr
+    assert len(answered) == calls
