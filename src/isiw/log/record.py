@@ -31,7 +31,7 @@ class SessionRecord(LoggedSession):
         kind = "Imported trials" if header.imported else "Session"
         strategy = header.strategy.name or "of a user's own objects"
         lines = [
-            f"{kind} of {header.subject or 'an unnamed subject'}, {header.created}",
+            f"{kind} of {header.subject or 'an unnamed subject'}, {self.begun or 'without a date'}",
             f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.in_words(header.stimulus)}",
             f"Trials: {self.table.counted(header.stimulus)}"
             + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
@@ -65,6 +65,11 @@ class SessionRecord(LoggedSession):
         """A sentence for each part of the header that this version cannot read."""
         said = "The log's {} cannot be read by this version of isiw: {}"
         return tuple(said.format(part, why) for part, why in self.unread.items())
+
+    @property
+    def begun(self) -> str:
+        """When it began, as ISO 8601 in UTC; empty of imported trials whose file does not say."""
+        return "" if self.header.imported and not self.header.given_by else self.header.created
 
     @property
     def rests_on_data(self) -> bool:
