@@ -125,6 +125,11 @@ classdef isiw < handle
       this.post(this.path('note'), {'text', char(text), 'key', this.new_key()});
     end
 
+    function change(this, text)
+      % That something changed that may bear on all later MEPs, such as the coil's place: the strategy learns of it.
+      this.post(this.path('change'), {'text', char(text), 'key', this.new_key()});
+    end
+
     function exclude(this, trial, reason)
       % Exclude a trial; nothing is erased.
       pairs = {'trial', number(trial), 'reason', char(reason), 'key', this.new_key()};

@@ -103,6 +103,7 @@ lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
 given = PULSES;
 lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr'), 'earlier', given));
 lab.alone(1.1, 120);
+lab.change('coil re-seated');
 lab.alone(0.1);
 lab.close();
 """
@@ -125,6 +126,7 @@ def test_pulses_over_the_curve_are_given_before_and_within_a_session(
     record = read_session(tmp_path / "sessions" / "P07.mcap")
     known = [(trial.mep_mv, trial.intensity_pct_rmt) for trial in (*record.header.earlier, *record.table)]
     assert known == [*before, (1.1, 120.0), (0.1, None)]
+    assert [(event.trial, event.text) for event in record.events if event.kind == "change"] == [(0, "coil re-seated")]
 
 
 NO_NUMBER = """
