@@ -154,6 +154,9 @@ classdef isiw < handle
 
   methods (Access = private)
     function whole = path(this, verb)
+      if isempty(this.id)
+        error('isiw:NoSession', 'No session was begun: call create or resume first. Nothing was sent.');
+      end
       whole = ['/sessions/' this.id '/' verb];
     end
 
