@@ -86,16 +86,25 @@ def test_what_is_no_sequence_of_trials_is_refused_with_the_way_to_them(no_trials
         strategy.learn_all(no_trials)
 
 
-@pytest.mark.parametrize(("before_mv", "own_mv", "is_silent"), [(0.3, 0.0, False), (0.0, 0.0, True), (0.0, 0.3, False)])
+@pytest.mark.parametrize(
+    ("before_mv", "own", "is_silent"),
+    [
+        (0.3, {"mep_mv": 0.0}, False),
+        (0.0, {"mep_mv": 0.0}, True),
+        (0.0, {"mep_mv": 0.3}, False),
+        (0.0, {"mep_interval_mv": (0.05, np.inf)}, False),
+        (0.0, {"mep_interval_mv": (0.0, 0.05)}, True),
+    ],
+)
 def test_a_log_is_silent_where_its_session_is_whatever_was_learnt_first(
-    tmp_path: Path, before_mv: float, own_mv: float, *, is_silent: bool
+    tmp_path: Path, before_mv: float, own: dict[str, Any], *, is_silent: bool
 ) -> None:
     trials = [Trial(n, Status.ACCEPTED, 90.0, isi_ms=90.0, mep_mv=before_mv) for n in range(5)]
     strategy, log = isiw.make_strategy(space=SPACE, seed=2, **SETTINGS), tmp_path / "a.mcap"
     limits = isiw.Limits.of_space(SPACE, min_iti_s=0)
     with isiw.open_session(strategy, log, earlier=trials, limits=limits) as session:
         for _ in range(3):
-            session.tell(session.ask(), own_mv)
+            session.tell(session.ask(), **own)
         estimate = session.estimate()
     record = isiw.read_session(log)
     assert record.is_silent == estimate.silent == is_silent

@@ -95,9 +95,7 @@ class SessionRecord(LoggedSession):
     @property
     def is_silent(self) -> bool:
         """True if enough trials count, those learnt first too, and each is 0, where the detection limit is too low."""
-        known = (*self.header.earlier, *self.table.told)
-        meps_mv = [trial.mep_mv for trial in known if trial.mep_mv is not None]
-        return is_silent(meps_mv, self.header.detection_limit_mv)
+        return is_silent((*self.header.earlier, *self.table.told), self.header.detection_limit_mv)
 
     @property
     def is_judged_since(self) -> bool:

@@ -73,10 +73,8 @@ def require_meps(record: SessionRecord) -> None:
     require_search(record.path, record.header)
     silent = "no MEP to learn from: every amplitude is 0, below the detection limit"
     told = record.table.told  # whatever was learnt before it
-    if is_silent([trial.mep_mv for trial in told if trial.mep_mv is not None], record.header.detection_limit_mv):
-        lacking: str | None = silent
-    else:
-        lacking = None if told else "no accepted trial to learn from"
+    is_mute = is_silent(told, record.header.detection_limit_mv)
+    lacking = silent if is_mute else None if told else "no accepted trial to learn from"
     if lacking is not None:
         raise LogError(f"the session has {lacking}", got=str(record.path), remedy="Leave this log out.")
 
