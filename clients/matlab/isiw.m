@@ -125,6 +125,11 @@ classdef isiw < handle
       this.post(this.path('note'), {'text', char(text), 'key', this.new_key()});
     end
 
+    function change(this, text)
+      % That something changed that may bear on all later MEPs, such as the coil's place: the strategy learns of it.
+      this.post(this.path('change'), {'text', char(text), 'key', this.new_key()});
+    end
+
     function exclude(this, trial, reason)
       % Exclude a trial; nothing is erased.
       pairs = {'trial', number(trial), 'reason', char(reason), 'key', this.new_key()};
@@ -149,6 +154,9 @@ classdef isiw < handle
 
   methods (Access = private)
     function whole = path(this, verb)
+      if isempty(this.id)
+        error('isiw:NoSession', 'No session was begun: call create or resume first. Nothing was sent.');
+      end
       whole = ['/sessions/' this.id '/' verb];
     end
 
@@ -195,7 +203,7 @@ classdef isiw < handle
     end
 
     function answer = call(this, send)
-      % Send until it is answered; wait where the server says how long.
+      % Send until it is answered, some times; wait where the server says how long, also for a long rest.
       attempt = 1;
       while true
         try
@@ -212,9 +220,11 @@ classdef isiw < handle
         if answer.ok
           return
         end
-        if isempty(answer.error.retry_s)
+        rests = strcmp(answer.error.type, 'TooEarly');
+        if isempty(answer.error.retry_s) || (attempt >= this.attempts && ~rests)
           error(['isiw:' answer.error.type], '%s', answer.error.message);
         end
+        attempt = attempt + ~rests;
         pause(answer.error.retry_s);
       end
     end

@@ -244,7 +244,7 @@ class Checked:
     def __get_pydantic_core_schema__(cls, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
         """What pydantic makes of the dataclass, with the declared checks at its fields, and bounds in JSON schemas."""
         schema: Any = handler(source)
-        plain_of = {name: partial(plain, what) for name, what, _, plain in _declared(cls)}  # type: ignore[arg-type]
+        plain_of = {name: partial(plain, name) for name, _, _, plain in _declared(cls)}  # type: ignore[arg-type]
         for field in schema["schema"]["fields"]:
             if (plain := plain_of.get(field["name"])) is not None:
                 field["schema"] = _checking(field["schema"], plain)

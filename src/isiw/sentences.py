@@ -281,5 +281,8 @@ def outcome(trial: Trial) -> str:
     if trial.reason is not None:
         return f"mistrial: {trial.reason}"
     text = "–" if trial.mep_mv is None else f"{1e3 * trial.mep_mv:.0f} µV"
+    if trial.mep_interval_mv is not None:
+        low_uv, high_uv = (1e3 * end_mv for end_mv in trial.mep_interval_mv)
+        text = f"above {low_uv:.0f} µV" if math.isinf(high_uv) else f"{low_uv:.0f}–{high_uv:.0f} µV"
     text += "" if trial.intensity_pct_rmt is None else f" at {trial.intensity_pct_rmt:g} %"
     return f"{text} (excluded)" if trial.excluded else text

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from cli.conftest import COMMAND, Command
+from cli.conftest import COMMAND, SHORT, Command
 from isiw.log.record import read_session
 from isiw.session.loop import Session
 from known import known
@@ -206,6 +206,13 @@ def test_day_and_operator_are_noted_in_the_log(isiw: Command, short: Path) -> No
     assert result.exit_code == 0, result.output
     visit = read_session("v.mcap").header.visit
     assert (visit.day, visit.operator) == (2, "MK")
+
+
+@pytest.mark.parametrize("call", [("run", "--earlier", "none.csv"), ("pair", "--after", "none.mcap")])
+def test_a_file_whose_place_an_option_takes_is_named(isiw: Command, tmp_path: Path, call: tuple[str, ...]) -> None:
+    (tmp_path / "visit.toml").write_text('earlier = ["curve.csv"]\n' + SHORT)
+    result = isiw(call[0], "visit.toml", *call[1:])
+    assert f"in the place of {tmp_path / 'curve.csv'}: nothing is learnt of these" in result.output
 
 
 def test_a_protocol_is_kept_and_its_controls_are_told_from_pairs(isiw: Command, short: Path) -> None:

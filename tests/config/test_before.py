@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 import isiw
 from isiw.config.given import Before, given_before
 from isiw.config.run import RunConfig, load_config
-from isiw.config.session import device_for, earlier_trials, intervention_for, session_for
+from isiw.config.session import device_for, earlier_trials, intervention_for, left_out, session_for
 from isiw.devices.protocol import info_of
 from isiw.errors import InvalidValueError
 from isiw.session.sink import SessionUpdate
@@ -108,3 +109,24 @@ def test_a_change_that_was_noted_in_the_search_is_known_afterwards_and_on_resumi
     strategy = session_for(after).strategy
     assert strategy.earlier_changed == (3,)
     assert strategy.restarted().estimate().probability == strategy.estimate().probability
+
+
+@pytest.mark.parametrize(
+    ("said", "left"),
+    [
+        ({"earlier": ["c.csv"]}, "a.csv, {0}/b.csv:"),
+        ({"earlier": ["c.csv", "b.csv"]}, "a.csv:"),
+        ({"after": ["other.mcap"]}, "day1.mcap:"),
+        ({"prior": "other.toml"}, "lab.toml:"),
+        ({"after": ["day1.mcap", "day2.mcap"], "seed": 3}, None),
+        ({}, None),
+    ],
+)
+def test_files_whose_place_options_take_are_named(tmp_path: Path, said: dict[str, Any], left: str | None) -> None:
+    stated = 'prior = "lab.toml"\nafter = ["day1.mcap"]\nearlier = ["a.csv", "b.csv"]'
+    (tmp_path / "visit.toml").write_text(stated)
+    config = load_config(tmp_path / "visit.toml")
+    named = {key: [tmp_path / file for file in value] for key, value in said.items() if isinstance(value, list)}
+    found = left_out(config, config.with_overrides(**said | named))
+    assert (found is None) == (left is None)
+    assert left is None or f"in the place of {tmp_path}/{left.format(tmp_path)} nothing is learnt" in str(found)

@@ -166,7 +166,7 @@ def test_the_sweep_ends_when_it_has_left_the_window_behind() -> None:
 
 def test_a_sweep_may_be_told_to_go_on_to_the_end() -> None:
     strategy = make_strategy("incremental", quiet_ms=0.0, max_trials=50)
-    assert strategy.decision().reason == "50 stimuli are left."
+    assert strategy.decision().reason == "50 stimuli are left of the budget of 50."
 
 
 def test_people_are_swept_side_by_side() -> None:

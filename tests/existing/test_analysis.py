@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import isiw
@@ -71,12 +72,28 @@ def test_an_export_of_single_trials_at_isis_of_their_own_is_read_as_what_it_is(t
         for number in range(5):
             session.tell(session.ask() + 0.1 * number, 0.1 + 0.01 * number)
         session.tell(session.ask(), mep_interval_mv=(0.05, math.inf))
+        session.tell(session.ask(), mep_interval_mv=(0.0, 0.05))
     isiw.export.export_logs(tmp_path / "P1.mcap", tmp_path / "tables")
     (delivered,) = read_people(tmp_path / "tables" / "trials.csv", Layout(reference=SPACE.reference))
-    trials = isiw.read_session(tmp_path / "P1.mcap").trials
-    assert list(delivered.trials)[:5] == list(isiw.read_session(tmp_path / "P1.mcap").table)[:5]
-    assert trials["mep_low_mv"].tolist()[5] == 0.05
-    assert trials[["mep_low_mv", "mep_high_mv"]].notna().sum().tolist() == [1, 0]
+    record = isiw.read_session(tmp_path / "P1.mcap")
+    assert list(delivered.trials) == list(record.table)
+    assert record.trials[["mep_low_mv", "mep_high_mv"]].notna().sum().tolist() == [2, 1]
+    assert [row[2] for row in isiw.report.words.trial_rows(record)][-2:] == ["above 50 µV", "0–50 µV"]
+
+
+@pytest.mark.parametrize(
+    ("dates", "day", "fact"),
+    [({}, "P7", "not known; imported 20"), ({"date": "2024-05-01 10:00"}, "P7, 2024-05-01 (UTC)", "2024-05-01 10:00")],
+)
+def test_trials_without_dates_are_of_no_day(dates: dict[str, str], day: str, fact: str) -> None:
+    isis_ms, meps_mv = told()
+    table = pd.DataFrame({"isi_ms": isis_ms, "mep_mv": meps_mv, **dates})
+    (delivered,) = read_people(table, Layout(reference="impact"), subject="P7")
+    record = analysed(delivered, isiw.make_strategy(space=SPACE, **FEW)).record
+    assert isiw.plots.session_figure(record).get_suptitle() == day
+    assert dict(isiw.report.tables.first_facts(record))["date"].startswith(fact)
+    ((_, _, begun, *_),) = isiw.report.comparison.comparison_rows([record])
+    assert begun == (fact if dates else "not known")
 
 
 def test_an_imported_log_says_the_same_and_that_it_was_no_session(tmp_path: Path) -> None:

@@ -149,6 +149,21 @@ def dated(*dates: str, **more: list[Any]) -> list[Delivered]:
     return read_people(pd.DataFrame({"isi_ms": [10.0, 20, 30, 40], "mep_mv": 0.1, "date": dates, **more}), IMPACT)
 
 
+@pytest.mark.parametrize(
+    ("dates", "trials_of_days"),
+    [
+        (["2026-12-01 23:50", "2026-12-01 23:59", "2026-12-02 00:05", "2026-12-02 01:10"], [4]),
+        (["2026-12-01T12:50+13:00", "2026-12-01T12:59+13:00", "2026-12-01T13:05+13:00", "2026-12-01T13:10+13:00"], [4]),
+        (["2026-10-25T02:40+02:00", "2026-10-25T02:59+02:00", "2026-10-25T02:05+01:00", "2026-10-25T02:20+01:00"], [4]),
+        (["2026-12-01 23:50", "2026-12-02 00:05", "2026-12-02 09:00", "2026-12-02 09:05"], [2, 2]),
+        (["2026-12-01 09:00", "2026-12-01 18:00", "2026-12-02 00:05", "2026-12-02 00:10"], [2, 2]),
+        (["2026-12-01", "2026-12-01", "2026-12-02", "2026-12-02"], [2, 2]),
+    ],
+)
+def test_a_session_that_goes_on_after_midnight_is_of_one_day(dates: list[str], trials_of_days: list[int]) -> None:
+    assert [len(one.trials) for one in dated(*dates)] == trials_of_days
+
+
 def test_days_come_first_with_points_and_slashes_are_asked_about() -> None:
     people = dated("31.01.2024", "31.01.2024", "01.02.2024", "01.02.2024")
     assert [(one.visit.day, one.created[:10]) for one in people] == [(1, "2024-01-31"), (2, "2024-02-01")]

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,9 +40,10 @@ def written(path: Path, trials: int, samples: int = 50) -> Path:
     return path
 
 
-def test_samples_of_other_channels_are_not_read_and_all_else_is(tmp_path: Path) -> None:
+@pytest.mark.parametrize("wanted", [["emg"], "emg"])
+def test_samples_of_other_channels_are_not_read_and_all_else_is(tmp_path: Path, wanted: Any) -> None:
     log = written(tmp_path / "one.mcap", 5)
-    whole, some, none = read_session(log), read_session(log, channels=["emg"]), read_session(log, channels=())
+    whole, some, none = read_session(log), read_session(log, channels=wanted), read_session(log, channels=())
     for record, kept in ((some, {"emg"}), (none, set[str]())):
         assert (record.history, record.losses, record.onsets) == (whole.history, whole.losses, whole.onsets)
         assert list(record.waveforms) == list(whole.waveforms)

@@ -103,6 +103,13 @@ def test_timing_and_rest_are_those_of_the_log_beside_their_limits(record: Sessio
     assert set(line_of(background, "limit, 10 µV")[1]) == {10.0}
 
 
+def test_of_a_muscle_that_is_to_be_contracted_no_limit_is_drawn(record: SessionRecord) -> None:
+    contracted = replace(record.header.signals, contracted=True)
+    header = record.header.model_copy(update={"signals": contracted})
+    for each in (replace(record, header=header), replace(record, header=header, history=())):
+        assert not any("limit" in str(line.get_label()) for line in course_figure(each).axes[1].lines)
+
+
 def test_what_was_not_recorded_is_said(record: SessionRecord) -> None:
     empty = replace(record, history=())
     assert [axes.texts[0].get_text() for axes in course_figure(empty).axes] == ["not recorded"] * 2

@@ -83,7 +83,7 @@ def test_tms_alone_stands_beside_the_range_with_its_mean(record: SessionRecord) 
 def test_subject_date_and_why_most_trials_lie_below_the_mean_are_in_the_picture(record: SessionRecord) -> None:
     header = record.header.model_copy(update={"subject": "$P07"})
     figure = session_figure(replace(record, header=header))
-    assert figure.get_suptitle() == f"\\$P07, {header.created[:10]}"
+    assert figure.get_suptitle() == f"\\$P07, {header.created[:10]} (UTC)"
     assert figure.legends[0].get_title().get_text() == BELOW_THE_MEAN
 
 

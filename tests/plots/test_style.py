@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
+from isiw.plots.comparison import comparison_figure
+from isiw.plots.session import save_session_plot, session_figure
 from isiw.plots.style import STRATEGY_COLOURS, explain, save_figure, strategy_colours
 from isiw.types import FloatArray
 
@@ -63,6 +67,16 @@ def test_a_picture_without_labels_has_no_legend_and_one_with_labels_has_each_onc
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["same"]
     explain(empty := Figure(), ncols=1)
     assert empty.legends == []
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [session_figure, lambda log: save_session_plot(log, "s.png"), lambda log: comparison_figure([log, log])],
+    ids=["session", "saved", "comparison"],
+)
+def test_the_path_of_a_log_is_no_record_to_draw(draw: Callable[[Any], object]) -> None:
+    with pytest.raises(InvalidValueError, match=r"Read the log first: isiw\.read_session"):
+        draw("P01.mcap")
 
 
 def linear(colour: str) -> FloatArray:

@@ -27,7 +27,9 @@ def record(tmp_path: Path) -> SessionRecord:
 
 def test_the_table_has_a_line_a_session_with_its_window_and_intervals(record: SessionRecord) -> None:
     headings, first, second = comparison_table([record, record]).splitlines()
-    assert headings.split() == ["session", "subject", "begun", "trials", "P(window)", "window", "start", "end"]
+    assert headings.split() == [
+        "session", "subject", "begun", "(UTC)", "trials", "P(window)", "window", "start", "end"
+    ]  # fmt: skip
     assert "P07" in first
     assert first.endswith("4       0.90       34–94 ms  29–39 ms  after 150 ms")
     assert second.startswith("2 ")

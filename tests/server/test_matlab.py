@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -30,6 +36,34 @@ def octave(client: httpx.Client, *arguments: str) -> subprocess.CompletedProcess
     )
 
 
+@contextmanager
+def answering(answer: Callable[[], dict[str, Any]]) -> Iterator[httpx.Client]:
+    """A client of a server that answers every call so."""
+
+    class Answering(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            self.rfile.read(int(self.headers["Content-Length"]))
+            body = json.dumps(answer()).encode()
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_: object) -> None:
+            """Nothing is shown."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Answering)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        with httpx.Client(base_url=f"http://127.0.0.1:{server.server_port}") as client:
+            yield client
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
 @pytest.mark.slow
 def test_the_example_of_forty_lines_runs_and_its_log_has_what_the_rig_delivered(tmp_path: Path) -> None:
     script = (CLIENT / "example.m").read_text("utf-8")
@@ -52,6 +86,7 @@ lab = isiw(getenv('ISIW_URL'), 'not the token');
 try, lab.create('P07'); catch problem, disp(problem.identifier); end
 lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
 try, lab.resume('P07'); catch problem, disp(problem.identifier); end
+try, lab.ask(); catch problem, disp(problem.identifier); end
 lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr')));
 [trial, isi_ms] = lab.ask();
 try, lab.ask(); catch problem, disp(problem.identifier); end
@@ -69,6 +104,7 @@ lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
 given = PULSES;
 lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr'), 'earlier', given));
 lab.alone(1.1, 120);
+lab.change('coil re-seated');
 lab.alone(0.1);
 lab.close();
 """
@@ -91,6 +127,7 @@ def test_pulses_over_the_curve_are_given_before_and_within_a_session(
     record = read_session(tmp_path / "sessions" / "P07.mcap")
     known = [(trial.mep_mv, trial.intensity_pct_rmt) for trial in (*record.header.earlier, *record.table)]
     assert known == [*before, (1.1, 120.0), (0.1, None)]
+    assert [(event.trial, event.text) for event in record.events if event.kind == "change"] == [(0, "coil re-seated")]
 
 
 NO_NUMBER = """
@@ -205,6 +242,29 @@ def test_what_is_refused_is_an_error_in_words_and_can_be_put_right(tmp_path: Pat
     with client_of(tmp_path / "sessions") as client:
         ran = octave(client, str(tmp_path / "refused.m"))
     assert ran.returncode == 0, ran.stderr
-    first, second, third, words, trials = ran.stdout.splitlines()
-    assert (first, second, third, trials.strip()) == ("isiw:Unauthorized", "isiw:NoSuchSession", "isiw:TrialOpen", "3")
+    *kinds, words, trials = ran.stdout.splitlines()
+    assert kinds == ["isiw:Unauthorized", "isiw:NoSuchSession", "isiw:NoSession", "isiw:TrialOpen"]
+    assert trials.strip() == "3"
     assert "mep_mv" in words
+
+
+BUSY = """
+lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+try, lab.create('P07'); catch problem, disp(problem.identifier); end
+"""
+
+
+@pytest.mark.parametrize(("kind", "calls"), [("Busy", 10), ("Overloaded", 10), ("TooEarly", 30)])
+def test_only_for_a_rest_is_waited_longer_than_ten_answers(tmp_path: Path, kind: str, calls: int) -> None:
+    (tmp_path / "busy.m").write_text(BUSY)
+    answered = []
+
+    def busy() -> dict[str, Any]:
+        answered.append(kind)
+        retry_s = 0.01 if len(answered) < 30 else None
+        return {"ok": False, "error": {"type": kind, "message": "not now", "retry_s": retry_s}}
+
+    with answering(busy) as client:
+        ran = octave(client, str(tmp_path / "busy.m"))
+    assert ran.stdout.split() == [f"isiw:{kind}"], ran.stderr
+    assert len(answered) == calls

@@ -174,6 +174,20 @@ def test_others_may_ask_only_with_tls(tmp_path: Path) -> None:
     assert len({ServerSettings(tmp_path).token for _ in range(3)}) == 3
 
 
+@WITH_OPENSSL
+@pytest.mark.parametrize("wrong", ["certificate", "key", "another's key"])
+def test_a_certificate_or_key_that_is_none_is_refused_in_words(tmp_path: Path, wrong: str) -> None:
+    (tmp_path / "other").mkdir()
+    (tmp_path / "text.pem").write_text("no certificate")
+    certificate, key = certified(tmp_path)
+    if wrong == "certificate":
+        certificate = tmp_path / "text.pem"
+    else:
+        key = tmp_path / "text.pem" if wrong == "key" else certified(tmp_path / "other")[1]
+    with pytest.raises(ConfigError, match="the certificate and its key cannot be used"):
+        ServerSettings(tmp_path, certificate=certificate, key=key).tls()
+
+
 @pytest.mark.slow
 @WITH_OPENSSL
 def test_with_a_certificate_it_is_served_by_tls_alone(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import isiw
-from isiw.trials import Trial
+from isiw.trials import Status, Trial
 
 SPACE = isiw.DesignSpace(0, 200, reference="impact")
 SETTINGS: dict[str, Any] = {"particles": 200, "max_trials": 4}
@@ -77,13 +77,39 @@ def test_a_session_that_goes_on_knows_them_still(tmp_path: Path) -> None:
     assert "Fewer than three" not in isiw.report.drawn.drawn(record)["beliefs"][0]["found"]
 
 
-@pytest.mark.parametrize("no_trials", [pd.DataFrame({"isi_ms": [40.0], "mep_mv": [0.1]}), "P01.mcap", 7])
+@pytest.mark.parametrize("no_trials", [pd.DataFrame({"isi_ms": [40.0], "mep_mv": [0.1]}), "P01.mcap", 7, np.array(7)])
 def test_what_is_no_sequence_of_trials_is_refused_with_the_way_to_them(no_trials: Any, tmp_path: Path) -> None:
     strategy = isiw.make_strategy("incremental", space=SPACE)
     with pytest.raises(isiw.errors.InvalidValueError, match=r"read_session\(log\)\.table"):
         isiw.open_session(strategy, tmp_path / "a.mcap", earlier=no_trials)
     with pytest.raises(isiw.errors.InvalidValueError, match=r"read_session\(log\)\.table"):
         strategy.learn_all(no_trials)
+
+
+@pytest.mark.parametrize(
+    ("before_mv", "own", "is_silent"),
+    [
+        (0.3, {"mep_mv": 0.0}, False),
+        (0.0, {"mep_mv": 0.0}, True),
+        (0.0, {"mep_mv": 0.3}, False),
+        (0.0, {"mep_interval_mv": (0.05, np.inf)}, False),
+        (0.0, {"mep_interval_mv": (0.0, 0.05)}, True),
+    ],
+)
+def test_a_log_is_silent_where_its_session_is_whatever_was_learnt_first(
+    tmp_path: Path, before_mv: float, own: dict[str, Any], *, is_silent: bool
+) -> None:
+    trials = [Trial(n, Status.ACCEPTED, 90.0, isi_ms=90.0, mep_mv=before_mv) for n in range(5)]
+    strategy, log = isiw.make_strategy(space=SPACE, seed=2, **SETTINGS), tmp_path / "a.mcap"
+    limits = isiw.Limits.of_space(SPACE, min_iti_s=0)
+    with isiw.open_session(strategy, log, earlier=trials, limits=limits) as session:
+        for _ in range(3):
+            session.tell(session.ask(), **own)
+        estimate = session.estimate()
+    record = isiw.read_session(log)
+    assert record.is_silent == estimate.silent == is_silent
+    assert str(estimate) in str(record)
+    assert ("all 8 trials that count are 0" in isiw.report.final_statement(record)) == is_silent
 
 
 def over_the_curve(number: int, seed: int) -> list[tuple[float, float]]:

@@ -315,10 +315,18 @@ def test_the_limits_hold(log: Path, space: DesignSpace) -> None:
     clock = VirtualClock()
     limits = Limits.of_space(space, min_iti_s=7.0, max_pulses=3)
     with open_session(scripted_strategy(9), log, limits=limits, clock=clock) as session:
-        run(session, 3)
+        run(session, 2)
+        session.ask()
+        assert not session.decision().stop
+        session.tell(session.ask(), 0.1)
+        decision = session.decision()
         with pytest.raises(LimitExceededError, match="3 pulses"):
             session.ask()
-    assert [intent.t_s for intent in read_session(log).intents] == [7.0, 14.0, 21.0]
+    assert (decision.stop, decision.reason) == (True, "The limit of 3 pulses is reached.")
+    record = read_session(log)
+    assert [intent.t_s for intent in record.intents] == [7.0, 14.0, 21.0]
+    assert record.decision == decision
+    assert "esume with" not in final_statement(record)
 
 
 def test_tms_alone_that_is_told_while_an_ask_waits_has_its_interval_too(log: Path, space: DesignSpace) -> None:

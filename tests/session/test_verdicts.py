@@ -15,13 +15,13 @@ import pytest
 import isiw
 from forked import Forked
 from isiw.devices.limits import Limits
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, LogError
 from isiw.findings import Kind
 from isiw.log.new_verdicts import LOOKED_AT
 from isiw.log.record import read_session
 from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.report import final_statement
-from isiw.session.afterwards import exclude, include
+from isiw.session.afterwards import estimate_again, exclude, include
 from isiw.session.loop import Session
 from isiw.session.resuming import open_session, resume
 from isiw.session.rig import Safeguards
@@ -339,3 +339,30 @@ def test_a_trial_is_named_by_a_whole_number(log: Path, number: Any) -> None:
     with pytest.raises(InvalidValueError, match="the number of a trial must be a whole number"):
         exclude(log, number, "a cough")
     assert [event.kind for event in read_session(log).events] == ["exclusion"]
+
+
+@pytest.mark.parametrize(
+    "again",
+    [
+        lambda log: exclude(log, 4, "a cough"),
+        lambda log: include(log, 2),
+        lambda log: estimate_again(log, scripted_strategy(8)),
+    ],
+    ids=["exclude", "include", "estimate"],
+)
+def test_a_closed_log_to_which_a_full_disk_adds_nothing_stays_as_it_was(
+    again: Callable[[Path], None], tmp_path: Path
+) -> None:
+    resource = pytest.importorskip("resource")
+    log = tmp_path / "s.mcap"
+    session_that({4: lambda session: session.exclude(2)}, log).run()
+    before, (usual, most) = log.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before), most))
+    try:
+        with pytest.raises(LogError, match=r"stays as it was\. Make room, and give the command again"):
+            again(log)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (usual, most))
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == {log: before}
+    again(log)
+    assert log.read_bytes() != before

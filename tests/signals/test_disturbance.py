@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,17 @@ def test_hum_leaves_the_amplitude_of_an_mep_as_it_is(hz: float, isi_ms: float) -
 def test_hum_is_not_an_mep() -> None:
     silent = [known(judged(trial, 90.0, hum_uv=25.0, mep_uv=0.0)[1].mep_mv) for trial in range(8)]
     assert max(silent) < 0.015  # as EMG at rest of 1.5 µV; with the hum it was 25 µV and more
+
+
+@pytest.mark.parametrize(("hum_uv", "noise_uv", "says"), [(60.0, 0.0, "mains hum of 60 Hz"), (0.0, 20.0, "is tense")])
+def test_a_trial_that_hum_alone_loses_is_not_laid_to_the_muscle(hum_uv: float, noise_uv: float, says: str) -> None:
+    one = sweep(1, 150.0, hum_uv=hum_uv, hz=60.0)
+    emg = one.channels["emg"]
+    noisy = emg.values + noise_uv * np.random.default_rng(0).standard_normal(emg.values.size)
+    one = replace(one, channels={"emg": replace(emg, values=noisy)})
+    trial = judge(one, Stimulus(1, 150.0), SPACE, LIMITS)
+    assert trial.reason is Kind.BACKGROUND_ACTIVITY
+    assert says in next(findings(Evidence(trial, one, LIMITS))).text
 
 
 def test_hum_is_said_after_four_trials_with_its_frequency_and_size() -> None:

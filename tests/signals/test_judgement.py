@@ -55,6 +55,13 @@ def test_tms_alone_has_no_isi_and_needs_no_impact() -> None:
     assert judged.mep_mv == pytest.approx(0.1, abs=0.01)
 
 
+@pytest.mark.parametrize("times", [{}, {"t_hit_ms": 5000.0}, {"t_valve_ms": 5000.0}])
+def test_a_tap_alone_whose_sweep_does_not_show_when_it_came_is_lost_and_ends_no_session(times: dict[str, Any]) -> None:
+    sweep = without(sweep_of(t_valve_ms=None, t_tms_ms=None), "acceleration")
+    judged = judge(replace(sweep, **times), Stimulus(0, None, tap_alone=True), IMPACT)
+    assert judged.reason is Kind.MISSING_CHANNEL
+
+
 @pytest.mark.parametrize("unit", [("uV", 1000.0), ("µV", 1000.0), ("V", 0.001)])
 def test_the_unit_of_the_emg_is_converted(unit: tuple[str, float]) -> None:
     name, factor = unit

@@ -30,7 +30,7 @@ def kinds_plainly(series: tuple[Counted, ...]) -> set[str]:
     """What is found in some amplitudes by going through all of them."""
     found, meps_mv = set[str](), [one.mep_mv for one in series]
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
-    if len(meps_mv) >= plausible.SILENT_FROM_THE_START and is_silent(meps_mv):
+    if len(meps_mv) >= plausible.SILENT_FROM_THE_START and is_silent([Trial.of(90.0, mep_mv) for mep_mv in meps_mv]):
         found.add("silent")
     if plausible.stopped_after([one.isi_ms for one in series], [one.stands_out for one in series]) is not None:
         found.add("stopped")

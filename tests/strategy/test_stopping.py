@@ -40,7 +40,7 @@ def test_a_mistrial_uses_up_budget_although_it_is_not_told() -> None:
 
 
 def test_the_budget_says_how_many_stimuli_are_left() -> None:
-    assert Budget(5)(progress(2)).reason == "3 stimuli are left."
+    assert Budget(5)(progress(2)).reason == "3 stimuli are left of the budget of 5."
 
 
 @pytest.mark.parametrize(("width_ms", "stop"), [(20.0, True), (40.0, False)])

@@ -169,7 +169,7 @@ def test_a_model_that_fails_leaves_the_strategy_as_it_was(monkeypatch: pytest.Mo
         with pytest.raises(RuntimeError, match="singular"):
             strategy.tell(isi_ms, 0.1)
     assert strategy.posterior is posterior
-    assert strategy.decision().reason == "6 stimuli are left."
+    assert strategy.decision().reason == "6 stimuli are left of the budget of 6."
     assert strategy.ask() == isi_ms
 
 

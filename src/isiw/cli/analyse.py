@@ -212,7 +212,7 @@ def _say_unused(people: list[Person], way: Way) -> None:
 
 
 def _analyse_one(person: Person, way: Way, source: Path, *, several: bool) -> None:
-    name = f"{person.delivered.subject}: " if several else ""
+    name = f"{isiw.existing.delivered.codes_of([person.delivered])}: " if several else ""
     if person.log is not None and isiw.existing.batch.is_there(person):
         show(f"{name}{person.log} is there already, of the same file and settings.")
         if not person.log.with_suffix(".png").exists():  # interrupted between the two

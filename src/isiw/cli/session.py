@@ -24,6 +24,7 @@ from isiw.cli.console import (
 from isiw.text.sanitize import command
 
 if TYPE_CHECKING:
+    from isiw.config import RunConfig
     from isiw.devices.protocol import Device
     from isiw.log.record import SessionRecord
     from isiw.session.loop import Session
@@ -80,7 +81,8 @@ def run(
 ) -> None:
     """Run a session with a simulated person, or with the device of a configuration, and say what was found."""
     with errors_reported():
-        settings = isiw.config.load_config(config).with_overrides(
+        settings = _settings(
+            config,
             seed=seed,
             log=log,
             subject=subject,
@@ -126,9 +128,7 @@ def pair(
             raise isiw.errors.ConfigError(
                 "an intervention needs a configuration that plans it", remedy="isiw pair CONFIG --after WINDOW_LOG"
             )
-        settings = isiw.config.load_config(config).with_overrides(
-            log=log, earlier=None if after is None else [after], day=day, operator=operator
-        )
+        settings = _settings(config, log=log, earlier=None if after is None else [after], day=day, operator=operator)
         show("Preparing the intervention …")
         _run_to_the_end(isiw.config.session.intervention_for(settings), config, live=live)
 
@@ -165,6 +165,15 @@ def resume(
         for difference in differences:
             show(difference, style="yellow", stderr=True)
         _run_to_the_end(session, config, live=live, resumed=True)
+
+
+def _settings(config: Path | None, **said: Any) -> RunConfig:
+    """A configuration with what options say, of which it is said if it takes the place of files."""
+    stated = isiw.config.load_config(config)
+    settings = stated.with_overrides(**said)
+    if left_out := isiw.config.session.left_out(stated, settings):
+        show(left_out, style="yellow", stderr=True)
+    return settings
 
 
 def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resumed: bool = False) -> None:

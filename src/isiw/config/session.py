@@ -225,6 +225,17 @@ def assumed_space(config: RunConfig) -> str | None:
     return None if is_stated else f"No [space] is given, so ISIs are {config.space}."
 
 
+def left_out(config: RunConfig, settings: RunConfig) -> str | None:
+    """That files of a configuration are not read, as options name others in their place; None if all are."""
+    stated, read = (
+        {path.resolve() for path in (one.prior, *one.after, *one.earlier) if path is not None}
+        for one in (config, settings)
+    )
+    if not (others := ", ".join(map(str, sorted(stated - read)))):
+        return None
+    return f"The command line names other files in the place of {others}: nothing is learnt of these, nor counted."
+
+
 def device_for(config: RunConfig) -> Device:
     """The device: the user's own, or a simulated person, under a simulated robot or in recorded EMG if asked for.
 

@@ -28,6 +28,7 @@ _BLANKS: Final = re.compile(r"(?<=\d)[ '’\N{NO-BREAK SPACE}\N{NARROW NO-BREAK 
 _DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")
 _ZONE: Final = re.compile(r":.*(z|utc|gmt|[+-]\d\d:?\d\d)\s*$", re.IGNORECASE)
 _FURTHEST_BEHIND: Final = dt.timedelta(hours=12)  # nowhere on Earth is the time of the day further behind UTC
+_APART: Final = dt.timedelta(hours=6)  # no session has such a break, and the nights between two have
 _ERROR: Final = re.compile(r"#(N/?[AV]|[^\W_/]+(/0)?[!?])")  # in whatever language
 _REMEDY: Final = "Write dates as 2026-01-31."
 _PSYCHOPY: Final = re.compile(r"_(\d\d)h(\d\d)\.(\d\d)")  # a time of the day as PsychoPy writes it behind a date
@@ -226,6 +227,15 @@ def dates_of(column: Column, rows: Iterable[int]) -> dict[int, dt.datetime]:
         if pd.isna(date):
             raise column.refused(row, "is no date", _REMEDY)
     return {row: date.to_pydatetime() for row, date in dates.items()}
+
+
+def days_of(dates: Mapping[int, dt.datetime]) -> dict[int, str]:
+    """The day of each row: the date of the first of those that follow each other, be it beyond midnight."""
+    days, rows = dict[int, str](), sorted(dates, key=lambda row: dates[row])
+    for before, row in zip([*rows[:1], *rows], rows, strict=False):
+        goes_on = before in days and dates[row] - dates[before] < _APART
+        days[row] = days[before] if goes_on else f"{dates[row].date()}"
+    return days
 
 
 def latest_of(texts: Sequence[str], dates: Sequence[dt.datetime | None]) -> str:

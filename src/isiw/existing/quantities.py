@@ -166,6 +166,8 @@ def _is_another(key: str, columns: Mapping[str, Column]) -> bool:
     if key == "tms_alone":
         return not {*map(str.casefold, texts)} <= {"", *WORDS["yes"], *WORDS["no"]}
     said = re.search(r"\d", "".join(texts)) if key == "order" else {"status", "exclude"} & columns.keys()
+    if key in {"mep_low", "mep_high"}:  # an interval has two ends
+        return not {"mep_low", "mep_high"} <= columns.keys()
     return key in {"order", "reason"} and not said  # such as before and after
 
 
@@ -184,11 +186,11 @@ def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:
 
 def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Column], tuple[str, str]]:
     """Columns whose numbers are in ms, mV or µV by the units that are stated; those of ISIs and amplitudes besides."""
-    numeric = ("isi", "mep", "asked", "isi_sd", "background", "intensity")
+    numeric = ("isi", "mep", "asked", "isi_sd", "mep_low", "mep_high", "background", "intensity")
     scaled = {**columns, **with_decimals({key: columns[key] for key in numeric if key in columns}, layout.decimal)}
     isi_unit = _required_unit("isi", "ISIs", scaled["isi"], layout, ISI_UNITS_MS)
     mep_unit = _required_unit("mep", "amplitudes", scaled["mep"], layout, EMG_UNITS) if "mep" in scaled else "mV"
-    factors = {"isi": ISI_UNITS_MS[isi_unit], "mep": EMG_UNITS[mep_unit]}
+    factors = {"isi": ISI_UNITS_MS[isi_unit], **dict.fromkeys(("mep", "mep_low", "mep_high"), EMG_UNITS[mep_unit])}
     for key, known, usual in (("asked", ISI_UNITS_MS, isi_unit), ("isi_sd", ISI_UNITS_MS, isi_unit),
                               ("background", EMG_UNITS, "uV")):  # fmt: skip
         if key in scaled:

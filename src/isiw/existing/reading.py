@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
@@ -16,7 +17,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import doubtful_numbers, doubts, formats, frames, recordings
 from isiw.existing.apart import read_apart
-from isiw.existing.cells import dates_of, is_missing, latest_of
+from isiw.existing.cells import dates_of, days_of, is_missing, latest_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered, spelt_otherwise
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
@@ -191,7 +192,8 @@ def _by_text(texts: Iterable[str], rows: Iterable[int]) -> dict[str, list[int]]:
 def _days(columns: Columns, rows: list[int], dates: Mapping[int, dt.datetime]) -> dict[int | None, list[int]]:
     """The rows of each day, by a column of days, or by several dates; days without a number are counted."""
     named = "day" in columns.of
-    texts = [columns["day"].text(row) if named else f"{dates[row].date()}" if row in dates else "" for row in rows]
+    days_by_date = days_of({row: dates[row] for row in rows if row in dates})
+    texts = [columns["day"].text(row) if named else days_by_date.get(row, "") for row in rows]
     days = _by_text(texts, rows)
     several = len(days.keys() - {""}) > 1
     if "" in days and (several or (named and any(days))):
@@ -242,18 +244,26 @@ def _trial(columns: Columns, row: int, number: int, space: DesignSpace, signals:
         "isi_ms": isi_ms,
         "isi_sd_ms": columns["isi_sd"].number(row) or 0.0,
         "mep_mv": mep_mv,
+        "mep_interval_mv": _interval_mv(columns, row) if mep_mv is None else None,
         "background_rms_uv": columns["background"].number(row),
         "excluded": "status" in columns.of and columns.excluded(row),
     }
     if columns.tap_alone(row):
         return Trial(number, Status.ACCEPTED, tap_alone=True, **{**facts, "commanded_isi_ms": None})
-    if lost is None and (mep_mv is None or (isi_ms is None and asked_ms is not None)):
+    is_unknown = mep_mv is None and facts["mep_interval_mv"] is None
+    if lost is None and (is_unknown or (isi_ms is None and asked_ms is not None)):
         lost = Kind.OUTCOME_UNKNOWN
     if lost is None and not {"status", "exclude"} & columns.of.keys() and mep_mv is not None:
         meant_ms = asked_ms if "asked" in columns.of or isi_ms is None else max(isi_ms, 0.0)
         measured = Measurement(mep_mv, isi_ms, facts["isi_sd_ms"], None)
         lost = judge_measurement(measured, Stimulus(number, meant_ms), space, signals).reason
     return Trial(number, Status.ACCEPTED if lost is None else Status.MISTRIAL, reason=lost, **facts)
+
+
+def _interval_mv(columns: Columns, row: int) -> tuple[float, float] | None:
+    """The interval in which an amplitude lies of which no more is known; None if its ends are not said."""
+    low_mv, high_mv = columns["mep_low"].number(row), columns["mep_high"].number(row)
+    return None if low_mv is None and high_mv is None else (low_mv or 0.0, math.inf if high_mv is None else high_mv)
 
 
 def _with_intensities(trials: Sequence[Trial], columns: Columns) -> tuple[list[Trial], float | None]:

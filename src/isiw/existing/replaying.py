@@ -153,7 +153,7 @@ def replay(
     if len(pairs) < _MARKS[0]:
         expected = f"{_MARKS[0]} pairs and more"
         raise InvalidValueError("too few trials to answer a strategy", got=len(pairs), expected=expected)
-    if is_silent([trial.mep_mv for trial in pairs if trial.mep_mv is not None], settings.get("detection_limit_mv")):
+    if is_silent(pairs, settings.get("detection_limit_mv")):
         raise refused(NO_MEP, f"{len(pairs)} amplitudes of 0")
     runs = []
     for name in strategies:

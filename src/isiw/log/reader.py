@@ -128,7 +128,8 @@ class LoggedSession(_StimuliRecord[Header]):
 
 def topics_of(channels: Iterable[str] | None) -> frozenset[str] | None:
     """The topics whose samples are kept if these channels are wanted; None is all."""
-    return None if channels is None else frozenset(map(waveform_topic, channels))
+    wanted = [channels] if isinstance(channels, str) else channels
+    return None if wanted is None else frozenset(map(waveform_topic, wanted))
 
 
 def read_any(salvaged: Salvage, wanted: LogKind, kind: type[LoggedT]) -> LoggedT | ThresholdRecord:

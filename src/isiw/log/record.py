@@ -31,7 +31,7 @@ class SessionRecord(LoggedSession):
         kind = "Imported trials" if header.imported else "Session"
         strategy = header.strategy.name or "of a user's own objects"
         lines = [
-            f"{kind} of {header.subject or 'an unnamed subject'}, {header.created}",
+            f"{kind} of {header.subject or 'an unnamed subject'}, {self.begun or 'without a date'}",
             f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.in_words(header.stimulus)}",
             f"Trials: {self.table.counted(header.stimulus)}"
             + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
@@ -67,6 +67,11 @@ class SessionRecord(LoggedSession):
         return tuple(said.format(part, why) for part, why in self.unread.items())
 
     @property
+    def begun(self) -> str:
+        """When it began, as ISO 8601 in UTC; empty of imported trials whose file does not say."""
+        return "" if self.header.imported and not self.header.given_by else self.header.created
+
+    @property
     def rests_on_data(self) -> bool:
         """True if enough pairs of stimuli count to speak of a window, and any trial showed an MEP."""
         return self.too_little is None
@@ -89,9 +94,8 @@ class SessionRecord(LoggedSession):
 
     @property
     def is_silent(self) -> bool:
-        """True if enough trials count, and each amplitude was 0, where the detection limit is too low for that."""
-        meps_mv = [trial.mep_mv for trial in self.table.told if trial.mep_mv is not None]
-        return is_silent(meps_mv, self.header.detection_limit_mv)
+        """True if enough trials count, those learnt first too, and each is 0, where the detection limit is too low."""
+        return is_silent((*self.header.earlier, *self.table.told), self.header.detection_limit_mv)
 
     @property
     def is_judged_since(self) -> bool:

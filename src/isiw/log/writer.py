@@ -248,6 +248,14 @@ class LogWriter:
             if in_place:
                 self._file.path.unlink()
 
+    def abandon(self, source: Path) -> bool:
+        """Let go of a copy; True if it was of a closed log that is still there, and is removed."""
+        is_spare = source == self.path and self.path.exists() and Fingerprint.of(self.path) == self._replaces
+        self._file.abandon()
+        if is_spare:
+            self._file.path.unlink()
+        return is_spare
+
     def close(self) -> None:
         """Finish the log and give it its name; what it went on from is the only file that it replaces.
 

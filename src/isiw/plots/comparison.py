@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from isiw.checks import choice
 from isiw.errors import InvalidValueError
 from isiw.lazy import pd
-from isiw.log.record import SessionRecord
+from isiw.log.record import SessionRecord, require_records
 from isiw.plots.style import (
     BLUE,
     FAINT,
@@ -202,8 +202,9 @@ def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | N
         names: what to call them; by default person and date.
 
     Raises:
-        InvalidValueError: no sessions, or ISIs that count from different events.
+        InvalidValueError: no sessions, no records of them, or ISIs that count from different events.
     """
+    require_records(records)
     references = {record.header.space.reference for record in records}
     if len(references) != 1:
         raise InvalidValueError("a picture needs sessions whose ISIs count from one event", got=sorted(references))

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from isiw.log.record import SessionRecord
+from isiw.log.record import SessionRecord, require_records
 from isiw.log.schema import EstimateRecord
 from isiw.plots.style import (
     BLUE,
@@ -64,7 +64,8 @@ def save_session_plot(
         overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
-        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
+        InvalidValueError: no record of a session, a format that matplotlib does not know, or a file that is not to be
+            replaced.
     """
     return save_figure(session_figure(record, truth=truth), path, overwrite=overwrite)
 
@@ -75,7 +76,11 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
     Args:
         record: the session.
         truth: the true window, if the person is simulated.
+
+    Raises:
+        InvalidValueError: no record of a session.
     """
+    require_records((record,))
     record.require_open()
     figure = Figure(figsize=(7.2, 6.8), layout="constrained")
     profile, edges, chance = figure.subplots(3, 1, height_ratios=(3.2, 1.5, 0.9))

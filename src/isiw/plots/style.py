@@ -102,7 +102,8 @@ def session_name(record: SessionRecord) -> str:
     """Whose session it is and of which day, as matplotlib writes it whatever is in it."""
     code = one_line(record.header.subject) or "unnamed"
     code = code if len(code) <= _LONGEST_CODE else f"{code[: _LONGEST_CODE - 1]}…"
-    return f"{code}, {record.header.created[:10]}".replace("$", r"\$")
+    day = f", {record.begun[:10]} (UTC)" if record.begun else ""
+    return f"{code}{day}".replace("$", r"\$")
 
 
 def tidied(*panels: Axes) -> None:

@@ -90,12 +90,12 @@ def course_figure(record: SessionRecord) -> Figure:
         timing.axhline(limit_ms, color=ORANGE, lw=1.2, ls=(0, (4, 3)), label="tolerance" if limit_ms > 0 else None)
     _draw(timing, record.table.trials, lambda trial: trial.isi_error_ms)
     timing.set(ylabel="realised − wanted ISI [ms]")
-    limit_uv = header.signals.background_uv
-    background.axhline(limit_uv, color=ORANGE, lw=1.2, ls=(0, (4, 3)), label=f"limit, {limit_uv:g} µV")
+    if math.isfinite(limit_uv := header.signals.most_background_uv):
+        background.axhline(limit_uv, color=ORANGE, lw=1.2, ls=(0, (4, 3)), label=f"limit, {limit_uv:g} µV")
     _draw(background, record.table.trials, lambda trial: trial.background_rms_uv)
     background.set(ylim=(0, None), ylabel="background EMG [µV RMS]", xlabel=TRIAL_AXIS)
     background.xaxis.set_major_locator(MaxNLocator(integer=True))
-    for axes in (timing, background):
+    for axes in (one for one in (timing, background) if one.get_legend_handles_labels()[0]):
         axes.legend(fontsize=7.5, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 

@@ -28,6 +28,7 @@ from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
 from isiw.priors.population import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
+from isiw.signals.plausible import is_silent
 from isiw.strategy.outcomes import Outcomes
 from isiw.text.sanitize import command
 from isiw.trials import Trial
@@ -71,7 +72,9 @@ def require_meps(record: SessionRecord) -> None:
     record.require_read("seed", "strategy", "device", "visit", "subject")
     require_search(record.path, record.header)
     silent = "no MEP to learn from: every amplitude is 0, below the detection limit"
-    lacking = silent if record.is_silent else None if record.table.told else "no accepted trial to learn from"
+    told = record.table.told  # whatever was learnt before it
+    is_mute = is_silent(told, record.header.detection_limit_mv)
+    lacking = silent if is_mute else None if told else "no accepted trial to learn from"
     if lacking is not None:
         raise LogError(f"the session has {lacking}", got=str(record.path), remedy="Leave this log out.")
 

@@ -22,7 +22,7 @@ from isiw.report.tables import first_facts
 from isiw.report.words import counts_sentence, findings
 from isiw.text.sanitize import one_line
 
-HEADINGS = ("session", "subject", "begun", "trials", "P(window)", "window", "start", "end")
+HEADINGS = ("session", "subject", "begun (UTC)", "trials", "P(window)", "window", "start", "end")
 """The columns of the table."""
 
 
@@ -41,7 +41,7 @@ def comparison_rows(records: Sequence[SessionRecord]) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for number, record in enumerate(records, start=1):
         record.require_open()
-        begun, last = record.header.created[:16].replace("T", " "), record.found
+        begun, last = record.begun[:16].replace("T", " ") or "not known", record.found
         who = (str(number), one_line(record.header.subject) or "unnamed", begun, str(len(record.table.told)))
         chance = "–" if last is None or last.probability is None else f"{last.probability:.2f}"
         if last is None:

@@ -50,7 +50,7 @@ def nothing_measured(record: SessionRecord) -> str | None:
         return f"{IN_DOUBT}"
     given, told = record.given, len(record.table.told)
     if record.is_silent:
-        return sentences.all_silent(told, NO_MEP.text)
+        return sentences.all_silent(told + len(record.header.earlier), NO_MEP.text)
     if told:
         return sentences.few_pairs(record.pairs, given)
     lost = [trial for trial in record.table if trial.reason is not None]

@@ -37,7 +37,8 @@ def first_facts(record: SessionRecord) -> list[Fact]:
     session = {"device": _device(record), "limits": _limits(header.limits)}
     groups = {
         "subject": _subject(record),
-        "date": header.created.replace("T", " ").replace("+00:00", " UTC"),
+        "date": ("" if record.begun else "not known; imported ")
+        + header.created.replace("T", " ").replace("+00:00", " UTC"),
         **(own if header.imported else session),
         **({"earlier": f"{counted(len(header.earlier), 'trial')}, learnt before the first"} if header.earlier else {}),
         "strategy": f"{header.strategy.name or 'of own objects'}, seed {header.strategy.seed}",

@@ -191,11 +191,18 @@ class ServerSettings(Checked):
             ) from error
 
     def tls(self) -> ssl.SSLContext | None:
-        """The context by which connections are encrypted; None without a certificate."""
+        """The context by which connections are encrypted; None without a certificate. Raise if it cannot be used."""
         if self.certificate is None:
             return None
         context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
-        context.load_cert_chain(self.certificate, self.key)
+        try:
+            context.load_cert_chain(self.certificate, self.key)
+        except ssl.SSLError as error:
+            raise ConfigError(
+                "the certificate and its key cannot be used",
+                got=f"{self.certificate} and {self.key} ({error.reason})",
+                expected="a certificate (PEM), and the key that belongs to it (PEM)",
+            ) from error
         return context
 
     def rules(self) -> Rules:

@@ -6,14 +6,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import isiw
+from isiw.checks import text
 from isiw.errors import InvalidValueError, LogError
 from isiw.intervention import Arm
 from isiw.log.continuing import require_session
+from isiw.log.headers import Header
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.new_verdicts import exclusion, inclusion
 from isiw.log.record import read_salvaged
-from isiw.log.salvage import salvage
-from isiw.log.schema import Event
+from isiw.log.salvage import Salvage, salvage
+from isiw.log.schema import Event, Record
 from isiw.log.verdicts import changed_after
 from isiw.log.writer import LogWriter
 from isiw.session.examination import estimate_record
@@ -54,9 +56,8 @@ def estimate_again(
     made.in_doubt = record.in_doubt
     last = record.table[-1].index
     said = f"Estimated again with isiw {isiw.__version__} from the trials as they count now."
-    with LogWriter.continuing(path, salvaged, record.header) as log:
-        log.append(Event(kind="note", trial=last, text=said))
-        log.append(estimate_record(made, last, made.decision(), None))
+    estimate = estimate_record(made, last, made.decision(), None)
+    _append(path, salvaged, record.header, Event(kind="note", trial=last, text=said), estimate)
 
 
 def exclude(path: str | Path, trial: int, reason: str) -> None:
@@ -72,7 +73,7 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
         DamagedLogError: the log's end is missing; resume the session first.
         InvalidValueError: no reason, no such trial, or one that counts for nothing anyway.
     """
-    if not reason.strip():
+    if not text("the reason of an exclusion", reason).strip():
         raise InvalidValueError(
             "a trial that is excluded afterwards needs a reason",
             got=reason,
@@ -115,9 +116,8 @@ def open_arm(path: str | Path) -> Arm:
         require_end(record)
         record.require_read()
         last = record.table[-1].index if record.table else None
-        text = f"The arm was opened: {intervention.arm.words}."
-        with LogWriter.continuing(path, salvaged, record.header) as log:
-            log.append(Event(kind="opening", trial=last, text=text))
+        said = f"The arm was opened: {intervention.arm.words}."
+        _append(path, salvaged, record.header, Event(kind="opening", trial=last, text=said))
     return intervention.arm
 
 
@@ -129,5 +129,19 @@ def _judge(path: str | Path, verdict: Callable[[TrialTable, Sequence[Event]], Ev
     require_end(record)
     if record.losses:  # then the header may be written again
         record.require_read()
-    with LogWriter.continuing(path, salvaged, record.header) as log:
-        log.append(event)
+    _append(path, salvaged, record.header, event)
+
+
+def _append(path: str | Path, salvaged: Salvage, header: Header, *records: Record) -> None:
+    """Append records to a log that nobody writes; a closed one stays as it was where that fails, as on a full disk."""
+    log = LogWriter.continuing(path, salvaged, header)
+    try:
+        for record in records:
+            log.append(record)
+        log.close()
+    except BaseException as error:
+        if not log.abandon(salvaged.path) or not isinstance(error, LogError):
+            raise
+        raise LogError(
+            error.what, got=str(log.path), remedy="The log stays as it was. Make room, and give the command again."
+        ) from error

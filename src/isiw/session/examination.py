@@ -15,7 +15,7 @@ import numpy as np
 
 from isiw import checks, summary
 from isiw.change import Change
-from isiw.decision import StopDecision
+from isiw.decision import StopDecision, StopKind
 from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.findings import Finding, Kind, Severity
@@ -58,6 +58,12 @@ class _Learner(Protocol[TableT, TrialT_contra]):
     def judged(self, trials: TableT, verdict: Event, /) -> TableT: ...
     def decision(self) -> StopDecision: ...
     def record(self, trial: int, decision: StopDecision, next_isi_ms: float | None, /) -> Record: ...
+
+
+def limit_reached(most: int, before: int) -> StopDecision:
+    """The decision to stop where so many pulses were given as the limits allow, some of them before the session."""
+    of_them = f", {before} of them before the session," if before else ""
+    return StopKind.LIMIT.stop(f"The limit of {most} pulses{of_them} is reached.")
 
 
 class Known(NamedTuple):

@@ -21,7 +21,7 @@ from isiw.log.new_verdicts import isi_confirmed, isi_doubted, newly_doubted
 from isiw.log.schema import Event, Intent
 from isiw.log.writer import LogWriter
 from isiw.session.earlier import Earlier
-from isiw.session.examination import Examination, examination_of
+from isiw.session.examination import Examination, examination_of, limit_reached
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
 from isiw.signals.plausible import (
@@ -48,6 +48,7 @@ class Recording(Generic[RecordedT]):
     _examination: Examination[Any, Any, RecordedT]
     _pacing: Pacing
     _asked: object = None
+    _decide: Callable[[], StopDecision] | None = None  # otherwise than what is learnt decides
 
     def __init__(self, log: LogWriter, clock: Clock) -> None:
         self._log, self._clock, self._sink = log, clock, Sink(log=log)
@@ -88,7 +89,7 @@ class Recording(Generic[RecordedT]):
         self._examination.came(trial)
         self._asked = None
         self._require_durable()
-        self._examination.conclude()
+        self._examination.conclude(self._decide)
 
 
 class Recorder(Recording[Trial], Judging):
@@ -119,6 +120,7 @@ class Recorder(Recording[Trial], Judging):
         self._limits, self._protocol, self._seed = header.limits, header.protocol, header.seed
         self._given_before = header.given_before
         self._asked: Stimulus | None = None
+        self._decide = self._within_limits
         self._lock = threading.RLock()
         self._pacing = Pacing(header.limits, clock, ages.ages_s)
         self._detection_limit_mv = header.detection_limit_mv
@@ -241,7 +243,7 @@ class Recorder(Recording[Trial], Judging):
         """
         pulse = flag("pulse", pulse)
         with self._lock:
-            self._examination.conclude()
+            self._examination.conclude(self._decide)
             if (isi_ms is None or not pulse) and self.asked is None:  # it was given, whatever the limits allow
                 self._begin(None, tap_alone=not pulse)
                 if self._given_before + len(self.trials) >= self._limits.max_pulses:
@@ -297,7 +299,7 @@ class Recorder(Recording[Trial], Judging):
             raise unconfirmed(self.in_doubt, self.strategy.space, wrong)
         for trial in self.in_doubt:
             self._examination.judge(lambda _, trial=trial: isi_confirmed(trial))  # type: ignore[misc]
-        self._examination.conclude()
+        self._examination.conclude(self._decide)
 
     def _put_in_doubt(self) -> bool:
         """Let trials not count whose realised ISIs are in doubt, and say so; True if there are any."""
@@ -305,7 +307,7 @@ class Recorder(Recording[Trial], Judging):
         for trial in found:
             self._examination.judge(lambda _, trial=trial: isi_doubted(trial))  # type: ignore[misc]
         if found:
-            self._examination.conclude()
+            self._examination.conclude(self._decide)
             self._doubts = self._doubts.after((IN_DOUBT,))
             self._warn(IN_DOUBT)
         return bool(found)
@@ -325,7 +327,7 @@ class Recorder(Recording[Trial], Judging):
         """
         known = Kind.of_mistrial(reason := text("the reason of a mistrial", reason))
         with self._lock:
-            self._examination.conclude()
+            self._examination.conclude(self._decide)
             asked = self._require_asked()
             if known != reason:
                 self._examination.note(reason, trial=asked.trial)
@@ -339,7 +341,7 @@ class Recorder(Recording[Trial], Judging):
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         with self._lock:
             self._examination.judge(verdict)
-            self._examination.conclude()
+            self._examination.conclude(self._decide)
 
     def estimate(self) -> WindowEstimate:
         """The estimate of the window now."""
@@ -348,14 +350,20 @@ class Recorder(Recording[Trial], Judging):
             return self.strategy.estimate()
 
     def decision(self) -> StopDecision:
-        """The decision to stop now or not, with its reason."""
+        """The decision to stop now or not, with its reason; where the limits allow no further pulse, to stop."""
         with self._lock:
             self._require_own()
-            return self.strategy.decision()
+            return self._within_limits()
+
+    def _within_limits(self) -> StopDecision:
+        """The strategy's decision, or the limits' own."""
+        decision, most, before = self._examination.learner.decision(), self._limits.max_pulses, self._given_before
+        is_last = self.asked is None and before + len(self.trials) >= most
+        return limit_reached(most, before) if is_last and not decision.stop else decision
 
     def _require_own(self) -> None:
         """Learn what is not learnt yet, and raise if the strategy knows anything else."""
-        self._examination.conclude()
+        self._examination.conclude(self._decide)
         self._examination.require_own()
 
     def _require_asked(self) -> Stimulus:

@@ -15,7 +15,7 @@ from functools import partial
 from typing import Final
 
 from isiw import schedule
-from isiw.decision import OF_THE_WINDOW, StopDecision, StopKind
+from isiw.decision import OF_THE_WINDOW, StopDecision
 from isiw.devices.protocol import Answer
 from isiw.errors import DeviceTimeoutError, IsiwError, LimitExceededError, NotDelivered, error_text
 from isiw.findings import Finding
@@ -24,7 +24,7 @@ from isiw.log.new_verdicts import correction
 from isiw.log.schema import Correction, Event, Intent, Waveform
 from isiw.pairing.agenda import Agenda
 from isiw.session.blocks import AHEAD_S, Blocks
-from isiw.session.examination import WindowExamination
+from isiw.session.examination import WindowExamination, limit_reached
 from isiw.session.intensities import set_for
 from isiw.session.pausing import Pausing, paused
 from isiw.session.rig import Rig
@@ -159,9 +159,7 @@ class Steps:
             return decision
         if self._rig.limited.pulses_left:
             return None
-        before = self._header.given_before
-        of_them = f", {before} of them before the session," if before else ""
-        decision = StopKind.LIMIT.stop(f"The limit of {self._header.limits.max_pulses} pulses{of_them} is reached.")
+        decision = limit_reached(self._header.limits.max_pulses, self._header.given_before)
         self._examination.event("limit", decision.reason)
         self._examination.log_estimate(lambda: decision)
         return decision

@@ -117,8 +117,11 @@ def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:
         return _mistrial(judged, Kind.MISSING_CHANNEL)
     emg = sweep.channels["emg"]
     hit_ms, wrong = _impact(sweep)
+    until_ms = sweep.t_valve_ms if hit_ms is None else hit_ms
     judged = replace(judged, t_hit_ms=hit_ms)
-    at_rest_until = replace(judged, t_tms_ms=sweep.t_valve_ms if hit_ms is None else hit_ms, t_hit_ms=None)
+    if until_ms is None or _on_channel(until_ms, emg) > 1000 * emg.values.size / emg.rate_hz:
+        return _mistrial(judged, wrong or Kind.MISSING_CHANNEL)
+    at_rest_until = replace(judged, t_tms_ms=until_ms, t_hit_ms=None)
     judged = replace(judged, background_rms_uv=_background_uv(emg.values * _unit_mv(emg), emg, at_rest_until))
     if wrong is None and _is_tense(judged, limits):
         wrong = Kind.BACKGROUND_ACTIVITY

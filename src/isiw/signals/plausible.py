@@ -12,7 +12,7 @@ import statistics
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 from isiw.checks import number
 from isiw.design import DesignSpace
@@ -238,6 +238,15 @@ def counted_of(trials: Iterable[Trial]) -> tuple[Counted, ...]:
     return tuple(Counted(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in comparable if t.mep_mv is not None)
 
 
+class _Measured(Protocol):
+    """A trial or its outcome: its amplitude, or the interval that it lies in [mV]."""
+
+    @property
+    def mep_mv(self) -> float | None: ...
+    @property
+    def mep_interval_mv(self) -> tuple[float, float] | None: ...
+
+
 MANY_BELOW_MV: Final = 0.02
 """Of a detection limit from here on, amplitudes of 0 are usual: most pulses below the threshold evoke less."""
 
@@ -247,9 +256,11 @@ def zeros_are_usual(detection_limit_mv: float | None) -> bool:
     return detection_limit_mv is not None and detection_limit_mv >= MANY_BELOW_MV
 
 
-def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> bool:
-    """Whether enough amplitudes count, and each is 0, where the detection limit is too low for that."""
-    return len(meps_mv) >= ENOUGH_PAIRS and not zeros_are_usual(detection_limit_mv) and not any(meps_mv)
+def is_silent(outcomes: Sequence[_Measured], detection_limit_mv: float | None = None) -> bool:
+    """Whether enough amplitudes count and no MEP was seen, where the detection limit is too low for that."""
+    meps_mv = [one.mep_mv for one in outcomes if one.mep_mv is not None]
+    above = any((one.mep_interval_mv or (0.0,))[0] or getattr(one, "response", None) for one in outcomes)
+    return len(meps_mv) >= ENOUGH_PAIRS and not (zeros_are_usual(detection_limit_mv) or any(meps_mv) or above)
 
 
 SMALL_MV, LARGE_MV = 8e-4, 4.0
@@ -356,8 +367,7 @@ def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> 
 
 def _last_seen_mv(told: Sequence[Counted]) -> list[float]:
     """The last amplitudes above the detection limit."""
-    seen = islice((one.mep_mv for one in reversed(told) if one.mep_mv > 0), IN_A_ROW)
-    return list(seen)[::-1]
+    return list(islice((one.mep_mv for one in reversed(told) if one.mep_mv > 0), IN_A_ROW))[::-1]
 
 
 def odd_amplitudes(told: Sequence[Counted], detection_limit_mv: float | None = None) -> Iterator[Finding]:

@@ -17,7 +17,7 @@ from isiw.findings import REMEDIES, Finding, Kind, Severity, UnitScale
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
 from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
-from isiw.signals.mep import MIN_BACKGROUND_MS
+from isiw.signals.mep import MIN_BACKGROUND_MS, at_rest, disturbance
 from isiw.signals.plausible import Counted, implausible_amplitude
 from isiw.signals.waveforms import PULSE_GUARD_MS, is_recording, samples
 from isiw.sweeps import Channel, Measurement, Sweep
@@ -260,8 +260,11 @@ def _explained(trial: Trial, evidence: Evidence) -> str:
             return f"the sweep has {before_ms:.0f} ms of EMG before the pulse, at least {least_ms:.0f} ms are needed"
         return "the acceleration has too little rest before the valve command"
     if trial.reason is Kind.BACKGROUND_ACTIVITY and trial.background_rms_uv is not None:
-        most_uv = evidence.limits.background_uv
-        return f"the muscle is tense: {trial.background_rms_uv:.0f} µV RMS, at most {most_uv:g} at rest"
+        level = f"{trial.background_rms_uv:.0f} µV RMS, at most {evidence.limits.background_uv:g} at rest"
+        found = emg and disturbance(EMG_UNITS_MV[emg.unit] * emg.values, emg.rate_hz, at_rest(emg, trial))
+        if found and found.hum_mv:
+            return f"the EMG before the pulse has {level}, and most of it is mains hum of {found.hum_hz:.0f} Hz"
+        return f"the muscle is tense: {level}"
     if trial.reason is Kind.ISI_OFF and trial.isi_ms is not None:
         return f"the realised ISI was {trial.isi_ms:.0f} ms, not the commanded {trial.commanded_isi_ms:g} ms"
     return f"{trial.reason}"

@@ -276,8 +276,7 @@ class Known:
 
     @property
     def _is_silent(self) -> bool:
-        meps_mv = [one.mep_mv for one in self.outcomes.pulses if one.mep_mv is not None]
-        return is_silent(meps_mv, self.detection_limit_mv)
+        return is_silent(self.outcomes.pulses, self.detection_limit_mv)
 
 
 def _for_lack(decision: StopDecision, found: Finding | None) -> StopDecision:

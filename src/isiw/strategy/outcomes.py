@@ -277,7 +277,7 @@ class Reported:
 
 def require_trials(trials: object) -> tuple[Trial, ...]:
     """Earlier trials, each of which must be a `Trial`."""
-    given = tuple(trials) if isinstance(trials, Iterable) else (trials,)
+    given = tuple(trials) if isinstance(trials, Iterable) and getattr(trials, "ndim", 1) != 0 else (trials,)
     for trial in given:
         if not isinstance(trial, Trial):
             raise InvalidValueError(

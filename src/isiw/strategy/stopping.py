@@ -53,7 +53,8 @@ class Budget(Checked):
         left = self.max_trials - progress.delivered
         if left <= 0:
             return StopKind.BUDGET.stop(f"The budget of {counted(self.max_trials, 'stimulus', 'stimuli')} is used up.")
-        return StopKind.BUDGET.go_on(f"{counted(left, 'stimulus is left', 'stimuli are left')}.")
+        are_left = counted(left, "stimulus is left", "stimuli are left")
+        return StopKind.BUDGET.go_on(f"{are_left} of the budget of {self.max_trials}.")  # limits may allow fewer
 
 
 @dataclass(frozen=True)
