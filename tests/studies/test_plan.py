@@ -68,7 +68,7 @@ def test_toml_values_make_the_same_study_again() -> None:
         (TOML.replace("people = 12", "people = 0"), r"people must be a whole number from 1 to .*; got 0"),
         (
             TOML + "amplitude = -1.0",
-            r"study.toml: the value of amplitude cannot be used: Study.amplitude .* above 0; got -1.0",
+            r"study.toml: the value of amplitude cannot be used: amplitude must .* above 0; got -1.0",
         ),
         (TOML + "seed = 5000000000000000000", r"seed must be a whole number from 0 to"),
         (TOML.replace('"ignored"', '"never"'), r"the value of stopping cannot be used; got 'never'"),
