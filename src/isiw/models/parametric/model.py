@@ -117,7 +117,7 @@ class ParametricModel(Checked):
         )
 
 
-TOGETHER: Final = 64
+SAMPLES_AT_ONCE: Final = 64
 """Samples whose table is worked out at once."""
 
 
@@ -178,12 +178,12 @@ class WindowSample:
         # Outcomes come first, and few samples at a time: twice as fast, as all stays in the processor's cache.
         mass = [
             log_likelihood(
-                Unknowns(*(field[None, :, first : first + TOGETHER] for field in u)),
+                Unknowns(*(field[None, :, first : first + SAMPLES_AT_ONCE] for field in u)),
                 table_levels(),
                 log_mep,
                 self.likelihood,
             ).softmax(0)
-            for first in range(0, u.floor_mv.shape[-1], TOGETHER)
+            for first in range(0, u.floor_mv.shape[-1], SAMPLES_AT_ONCE)
         ]
         return torch.cat(mass, dim=2).movedim(0, -1).contiguous()
 

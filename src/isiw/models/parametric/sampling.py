@@ -17,7 +17,7 @@ from isiw.models.parametric.normal import log_standard
 from isiw.models.parametric.tensors import Tensor, Trials
 from isiw.models.shared.draws import systematic
 
-TOGETHER: Final = 8000
+LIKELIHOODS_AT_ONCE: Final = 8000
 """Likelihoods of a trial that are worked out at once: more than these do not stay in a processor's cache."""
 
 TREE_DEPTH: Final = 6
@@ -51,7 +51,7 @@ class WindowProgram:
 
     def log_density(self, latents: Tensor, trials: Trials) -> Tensor:
         """Log density of the program's trace for each of many latents (m, d), shape (m,)."""
-        few = max(TOGETHER // max(len(trials.isi_ms), 1), 1)
+        few = max(LIKELIHOODS_AT_ONCE // max(len(trials.isi_ms), 1), 1)
         log_likelihood = [self.log_likelihood(part, trials) for part in torch.split(latents, few)]
         return log_standard(latents) + torch.cat(log_likelihood)
 
