@@ -194,7 +194,7 @@ class ProfileSample:
         low, high = (level - reach).amin((1, 2, 3)), (level + reach).amax((1, 2, 3))
         share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=level.dtype)
         outcomes = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1))[:, None, None, :]
-        # One person at a time and in place, as a processor's cache holds it: three times as fast.
+        # One person at a time and in place, which a processor's cache holds.
         mass = level.new_empty((*level.shape[:-1], OUTCOMES))
         for own, outcome, middle, sd in zip(mass, outcomes, level, noise_sd, strict=True):
             torch.sub(outcome, middle, out=own).div_(sd).square_().mul_(-0.5)

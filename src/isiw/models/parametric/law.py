@@ -194,7 +194,7 @@ def _components(unknowns: Unknowns, level: Tensor, likelihood: Likelihood) -> _C
     if likelihood == "input-noise":
         share = (evoked_mv / u.saturation_mv).clamp(1e-9, 1.0 - 1e-9)
         drive = torch.sqrt(1.0 + u.input_sd.square()) * torch.special.ndtri(share)
-        # Nodes come first: torch is several times as fast along trials, which are many, as along nodes.
+        # Nodes come first: torch is faster along trials, which are many, than along nodes.
         x = drive + u.input_sd * _nodes(level.dtype)[0].view(-1, *(1 for _ in drive.shape))
         # The normal distribution function, faster than torch's own, which differs only if it is nearly 0.
         evoked_mv = u.saturation_mv * (0.5 + 0.5 * torch.erf(x * math.sqrt(0.5)))

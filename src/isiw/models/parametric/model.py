@@ -175,7 +175,7 @@ class WindowSample:
         high = torch.quantile((u.baseline_mv + u.amplitude_mv).log(), 0.95, dim=-1) + 1.5
         share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=torch.float32).unsqueeze(-1)
         log_mep = (low + share * (high - low))[..., None, None, None].expand(-1, -1, -1, -1, 2)
-        # Outcomes come first, and few samples at a time: twice as fast, as all stays in the processor's cache.
+        # Outcomes come first, and few samples at a time, which a processor's cache holds.
         mass = [
             log_likelihood(
                 Unknowns(*(field[None, :, first : first + SAMPLES_AT_ONCE] for field in u)),

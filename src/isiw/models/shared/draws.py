@@ -17,7 +17,7 @@ OUTCOMES: Final = 24
 """Cells of the log MEP in which predictive distributions live."""
 
 NEARLY_NOTHING: Final = -80.0
-"""Log of a share of a sum that single precision does not see; powers of e below it take torch 15 times as long."""
+"""Log of a share of a sum that single precision does not see; powers of e below it are slow."""
 
 SIMULATED: Final = 2**31
 NOTED: Final = 2**30
